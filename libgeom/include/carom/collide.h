@@ -1,0 +1,81 @@
+/* collide.h: distance, normal and contact points of two convex shapes, and their derivatives.
+ *
+ * The normal is a unit vector from A to B.  Gaps are positive apart and negative overlapping.
+ * All results are relative to the bodies' positions (arms), so a scene far from the origin loses
+ * nothing: world point on A = (pose_a.x, pose_a.y) + arm_a. */
+#ifndef CAROM_COLLIDE_H
+#define CAROM_COLLIDE_H
+
+#include "carom/shape.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum carom_kernel {
+    CAROM_POINT_POINT,  /* EQUATIONS (41): vertex `ref` of A, vertex `inc` of B */
+    CAROM_EDGE_VERTEX,  /* (42): edge `ref` of the reference shape, vertex `inc` of the other */
+    CAROM_EDGE_CLIPPED  /* (42) after (43): edge `inc` of the other shape, clipped at an end of `ref` */
+} carom_kernel;
+
+/* How a contact point is computed: all that its derivative needs.  Edge k runs from vertex k to
+ * k + 1 (cyclic).  Also the point's stable identity across steps. */
+typedef struct carom_recipe {
+    int ref;
+    int inc;
+    unsigned char kernel;  /* carom_kernel */
+    unsigned char flipped; /* 1: the reference edge belongs to B */
+    unsigned char at_end;  /* clipped: 0 at the start of the reference edge, 1 at its end */
+    unsigned char side;    /* two-vertex reference shapes: 1 when the edge is used from its far side */
+} carom_recipe;
+
+typedef struct carom_contact_point {
+    carom_vec2 arm_a; /* contact point on A - position of A, world axes [m] */
+    carom_vec2 arm_b; /* contact point on B - position of B, world axes [m] */
+    double gap;       /* [m] */
+    carom_recipe recipe;
+} carom_contact_point;
+
+typedef struct carom_manifold {
+    carom_vec2 normal; /* unit, from A to B; common to all points */
+    double distance;   /* signed distance of the shapes [m]; a lower bound > margin when count = 0 */
+    int count;         /* 0, 1 or 2 */
+    int ambiguous;     /* 1: another reference face is as good within rounding, or centers coincide */
+    carom_contact_point points[2]; /* with gap <= margin */
+} carom_manifold;
+
+/* Contact manifold of two valid shapes.  margin [m] >= 0, or HUGE_VAL for points at any gap. */
+CAROM_API carom_manifold carom_collide(const carom_shape *a, carom_pose pose_a,
+                                       const carom_shape *b, carom_pose pose_b, double margin);
+
+/* The point and normal that a recipe gives at these poses (no search). */
+CAROM_API carom_contact_point carom_contact_eval(const carom_shape *a, carom_pose pose_a,
+                                                 const carom_shape *b, carom_pose pose_b,
+                                                 carom_recipe recipe, carom_vec2 *normal);
+
+/* Cotangent of one contact point. */
+typedef struct carom_contact_bar {
+    carom_vec2 normal;
+    carom_vec2 arm_a;
+    carom_vec2 arm_b;
+    double gap;
+} carom_contact_bar;
+
+/* Cotangent of one posed shape; vertices (count of them) may be NULL. */
+typedef struct carom_shape_bar {
+    carom_pose pose;
+    double radius;
+    carom_vec2 *vertices;
+} carom_shape_bar;
+
+/* Reverse derivative of carom_contact_eval: ADDS to *a_bar and *b_bar the gradient of
+ * <bar, (normal, arm_a, arm_b, gap)> with respect to both poses, radii and vertices. */
+CAROM_API void carom_contact_vjp(const carom_shape *a, carom_pose pose_a, const carom_shape *b,
+                                 carom_pose pose_b, carom_recipe recipe,
+                                 const carom_contact_bar *bar, carom_shape_bar *a_bar,
+                                 carom_shape_bar *b_bar);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

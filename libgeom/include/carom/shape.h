@@ -1,0 +1,66 @@
+/* shape.h: convex shapes, their validation and mass properties.
+ *
+ * A shape is a view: the caller owns the vertices and keeps them alive while the view is used.
+ * One vertex: circle.  Two: capsule (or segment when radius = 0).  Three or more: convex hull,
+ * rounded when radius > 0.  The solid is the convex hull of the vertices grown by radius.
+ * Vertices are in the body frame; the vertices of a hull run counterclockwise. */
+#ifndef CAROM_SHAPE_H
+#define CAROM_SHAPE_H
+
+#include "carom/base.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct carom_shape {
+    double radius;              /* rounding [m], >= 0; > 0 when count = 1 */
+    int count;                  /* number of vertices, >= 1 */
+    const carom_vec2 *vertices; /* count vertices, body frame [m] */
+} carom_shape;
+
+/* What is wrong with a shape. */
+typedef enum carom_shape_fault {
+    CAROM_SHAPE_VALID = 0,
+    CAROM_SHAPE_COUNT,      /* no vertices */
+    CAROM_SHAPE_RADIUS,     /* negative or not finite; or zero for a circle */
+    CAROM_SHAPE_NOT_FINITE, /* a coordinate is NaN or infinite */
+    CAROM_SHAPE_DUPLICATE,  /* a vertex equals the next one within 1e-12 of the extent */
+    CAROM_SHAPE_CLOCKWISE,  /* reverse the order */
+    CAROM_SHAPE_REFLEX,     /* the interior angle at a vertex exceeds 180 degrees */
+    CAROM_SHAPE_COLLINEAR,  /* a vertex lies on the line of its neighbors within 1e-12 of the extent */
+    CAROM_SHAPE_CROSSING,   /* the outline winds more than once around */
+    CAROM_SHAPE_AREA        /* area below 1e-12 of the squared extent */
+} carom_shape_fault;
+
+typedef struct carom_shape_error {
+    carom_shape_fault fault;
+    int vertex; /* index of the offending vertex, -1: the shape as a whole */
+} carom_shape_error;
+
+/* CAROM_OK, or CAROM_E_SHAPE with *error filled (may be NULL).  Nothing is repaired. */
+CAROM_API carom_status carom_shape_check(const carom_shape *shape, carom_shape_error *error);
+/* Writes one sentence ("vertex 3: clockwise; reverse the order"), always terminated. */
+CAROM_API void carom_shape_error_text(carom_shape_error error, char *text, size_t size);
+
+typedef struct carom_mass_properties {
+    double area;         /* [m^2] */
+    carom_vec2 centroid; /* body frame [m] */
+    double mass;         /* density * area [kg] */
+    double inertia;      /* about the centroid [kg m^2] */
+} carom_mass_properties;
+
+/* Mass properties of a valid shape from its density [kg/m^2].  Rounded hulls and capsules include
+ * the rounding exactly (hull + edge strips + corner sectors). */
+CAROM_API carom_mass_properties carom_shape_mass(const carom_shape *shape, double density);
+
+/* Reverse derivative of carom_shape_mass: adds to *density_bar, *radius_bar and vertices_bar[count]
+ * (each may be NULL) the gradient of <bar, properties>. */
+CAROM_API void carom_shape_mass_vjp(const carom_shape *shape, double density,
+                                    carom_mass_properties bar, double *density_bar,
+                                    double *radius_bar, carom_vec2 *vertices_bar);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,131 @@
+/* contact.h: the frictional contact problem of one step, solved to a certificate, and its adjoint.
+ *
+ * Unknowns: velocities v (3 per body: omega, vx, vy), per contact (l_n, l_t), per joint row l_e.
+ *
+ *   v = u + W (J_n' l_n + J_t' l_t + J_e' l_e)              W = diag(inverse masses)
+ *   0 <= l_n  _|_  a = J_n v + c_n >= 0
+ *   |l_t| <= mu l_n;  J_t v + c_t = 0 if |l_t| < mu l_n, else J_t v + c_t opposes l_t
+ *   J_e v + c_e = 0
+ *
+ * (EQUATIONS (4)-(6), section 2.)  A body with W = 0 moves with its u whatever touches it.  Body
+ * index -1 is the resting world; its coefficients are ignored.  This header knows no geometry. */
+#ifndef CAROM_CONTACT_H
+#define CAROM_CONTACT_H
+
+#include "carom/base.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A view; the caller owns every array. */
+typedef struct carom_contact_problem {
+    int n_bodies;
+    int n_contacts;
+    int n_joint_rows;
+    const double *inv_mass;  /* 3 n_bodies [1/(kg m^2), 1/kg, 1/kg], >= 0 */
+    const double *u;         /* 3 n_bodies: velocity without contacts and joints, v + h f / m */
+    const int *contact_body; /* 2 n_contacts: body A and body B of each; -1 the world */
+    const double *jn;        /* 6 n_contacts: row of J_n, 3 numbers of A then 3 of B */
+    const double *jt;        /* 6 n_contacts: row of J_t; a frictionless contact's row is not read */
+    const double *mu;        /* n_contacts [1], >= 0 */
+    const double *cn;        /* n_contacts [m/s] */
+    const double *ct;        /* n_contacts [m/s], NULL: zero */
+    const int *joint_body;   /* 2 n_joint_rows */
+    const double *je;        /* 6 n_joint_rows */
+    const double *ce;        /* n_joint_rows, NULL: zero */
+} carom_contact_problem;
+
+typedef enum carom_contact_mode {
+    CAROM_SEPARATED = 0,
+    CAROM_STICK = 1,      /* also: frictionless and closed */
+    CAROM_SLIP_MINUS = 2, /* l_t = -mu l_n */
+    CAROM_SLIP_PLUS = 3   /* l_t = +mu l_n */
+} carom_contact_mode;
+
+/* The caller owns the arrays, sized by the problem. */
+typedef struct carom_contact_solution {
+    double *v;           /* 3 n_bodies */
+    double *ln;          /* n_contacts [N s] */
+    double *lt;          /* n_contacts [N s] */
+    double *le;          /* n_joint_rows */
+    unsigned char *mode; /* n_contacts, carom_contact_mode; on input the guess */
+} carom_contact_solution;
+
+typedef struct carom_contact_settings {
+    double accept;      /* scaled natural residual of "solved" [1], 1e-10 */
+    double inexact;     /* ... of "inexact" [1], 1e-6 */
+    int max_iterations; /* interior point iterations per start, 60 */
+    int max_restarts;   /* seeded restarts at the end of the ladder, 12 */
+} carom_contact_settings;
+
+CAROM_API carom_contact_settings carom_contact_defaults(void);
+
+typedef enum carom_contact_stage {
+    CAROM_STAGE_NONE,           /* nothing to solve: no contact and no joint */
+    CAROM_STAGE_GUESS,          /* the caller's guess of modes held, or led on */
+    CAROM_STAGE_FREE,           /* active set from the free motion */
+    CAROM_STAGE_STICK,          /* active set from all contacts sticking */
+    CAROM_STAGE_INTERIOR_POINT, /* then polished by active set */
+    CAROM_STAGE_SWEEPS,         /* projected Gauss-Seidel, then polished */
+    CAROM_STAGE_LEMKE,
+    CAROM_STAGE_RESTART
+} carom_contact_stage;
+
+typedef struct carom_contact_stats {
+    carom_status status;
+    carom_contact_stage stage;  /* the one that gave the result */
+    double residual;            /* EQUATIONS (22) of the result [1] */
+    double residual_unpolished; /* before the active-set polish [1] */
+    int factorizations;
+    int iterations; /* interior point */
+    int degenerate; /* contacts weakly active or on the slip border within 1e-9 */
+} carom_contact_stats;
+
+typedef struct carom_contact_solver carom_contact_solver;
+
+/* settings, allocator: NULL for defaults. */
+CAROM_API carom_status carom_contact_create(const carom_contact_settings *settings,
+                                            const carom_allocator *allocator,
+                                            carom_contact_solver **out);
+CAROM_API void carom_contact_destroy(carom_contact_solver *solver);
+/* Bytes held and number of allocations made so far. */
+CAROM_API void carom_contact_memory(const carom_contact_solver *solver, size_t *bytes, long *calls);
+
+/* Solves the problem.  x->mode is the first guess when use_guess.  CAROM_OK: residual <= accept.
+ * CAROM_INEXACT: residual <= inexact.  CAROM_E_INFEASIBLE: no v with J_e v + c_e = 0 and
+ * J_n v + c_n >= 0.  CAROM_E_NO_SOLUTION: x holds the best point found, stats its residual (the one
+ * exception to "outputs untouched").  stats may be NULL.  Workspace grows and is kept. */
+CAROM_API carom_status carom_contact_solve(carom_contact_solver *solver,
+                                           const carom_contact_problem *problem, int use_guess,
+                                           carom_contact_solution *x, carom_contact_stats *stats);
+
+/* The scaled natural residual, EQUATIONS (22), of any point: NaN in x gives HUGE_VAL. */
+CAROM_API double carom_contact_residual(const carom_contact_problem *problem,
+                                        const carom_contact_solution *x);
+
+/* Cotangents of the problem's data: same shapes as in carom_contact_problem; NULL: not wanted. */
+typedef struct carom_contact_bars {
+    double *inv_mass; /* u held fixed */
+    double *u;
+    double *jn;
+    double *jt;
+    double *mu;
+    double *cn;
+    double *ct;
+    double *je;
+    double *ce;
+} carom_contact_bars;
+
+/* Adjoint at a solution and its modes, EQUATIONS (30): OVERWRITES the wanted arrays of `bars` with
+ * the gradient of <v_bar, v>.  One factorization and one transposed solve, with refinement, so that
+ * redundant rows give the right limit.  v_bar: 3 n_bodies, may alias no output. */
+CAROM_API carom_status carom_contact_adjoint(carom_contact_solver *solver,
+                                             const carom_contact_problem *problem,
+                                             const carom_contact_solution *x, const double *v_bar,
+                                             carom_contact_bars *bars);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

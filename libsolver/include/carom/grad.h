@@ -1,0 +1,70 @@
+/* grad.h: the tape of a run and the exact gradient of a loss of its states. */
+#ifndef CAROM_GRAD_H
+#define CAROM_GRAD_H
+
+#include "carom/world.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct carom_tape carom_tape;
+
+/* A tape records the steps of one world, from the state it has now.  allocator: NULL for the heap.
+ * The world must outlive the recording; bodies and joints must not be added meanwhile. */
+CAROM_API carom_status carom_tape_create(carom_world *world, const carom_allocator *allocator,
+                                         carom_tape **out);
+CAROM_API void carom_tape_destroy(carom_tape *tape);
+/* carom_world_step, recorded.  A failed step is not recorded. */
+CAROM_API carom_status carom_tape_step(carom_tape *tape, const double *force,
+                                       carom_step_stats *stats);
+/* Forgets all steps; the next recording starts at the world's present state. */
+CAROM_API void carom_tape_rewind(carom_tape *tape);
+CAROM_API int carom_tape_steps(const carom_tape *tape);
+CAROM_API size_t carom_tape_bytes(const carom_tape *tape);
+/* Recorded state after `step` steps, 0 <= step <= carom_tape_steps: 3 n_bodies, owned by the tape. */
+CAROM_API const double *carom_tape_q(const carom_tape *tape, int step);
+CAROM_API const double *carom_tape_v(const carom_tape *tape, int step);
+
+/* Cotangent of the state after `step` steps: dl/dq, dl/dv (3 n_bodies each; NULL: zero). */
+typedef struct carom_state_bar {
+    int step;
+    const double *q;
+    const double *v;
+} carom_state_bar;
+
+/* Where the gradient goes: NULL is not computed; given arrays are overwritten.
+ * Mass and inertia are partial derivatives of the stored numbers: gravity is mass * g. */
+typedef struct carom_gradient {
+    double *q0;          /* 3 n_bodies, state at the start of the tape */
+    double *v0;          /* 3 n_bodies */
+    double *mass;        /* n_bodies */
+    double *inertia;     /* n_bodies */
+    double *friction;    /* n_bodies */
+    double *restitution; /* n_bodies */
+    double *gravity;     /* 2 */
+    double *force;       /* 3 n_bodies: a constant force on each body through all steps */
+    double *force_steps; /* 3 n_bodies x steps: the force of each step */
+    double *radius;      /* n_shapes, in the order of adding */
+    carom_vec2 *vertices;/* n_vertices, in the order of adding; body frame */
+    carom_vec2 *anchors; /* 2 n_joints: anchor in the frame of body A, then of body B */
+} carom_gradient;
+
+typedef struct carom_gradient_stats {
+    int degenerate;      /* contacts at kinks, all sub-steps: a one-sided element was taken */
+    int first_degenerate_step; /* -1: none */
+    int factorizations;
+} carom_gradient_stats;
+
+/* Reverse pass over the whole tape: gradient of  sum_k <q_bar_k, q_k> + <v_bar_k, v_k>.
+ * bars: n_bars of them, any order, several for one step add up.  stats may be NULL.
+ * A static body's q0 counts (moving the floor moves the contact); its v0 gradient is zero. */
+CAROM_API carom_status carom_tape_gradient(carom_tape *tape, int n_bars,
+                                           const carom_state_bar *bars,
+                                           const carom_gradient *gradient,
+                                           carom_gradient_stats *stats);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,186 @@
+/* world.h: bodies, joints, forces and the step.
+ *
+ * Arrays of a world hold three numbers per body in the order of adding, static bodies included:
+ * q = (angle, x, y), v = (omega, vx, vy), force = (torque, fx, fy).  SI units, radians. */
+#ifndef CAROM_WORLD_H
+#define CAROM_WORLD_H
+
+#include "carom/contact.h"
+#include "carom/shape.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum carom_body_type {
+    CAROM_DYNAMIC,
+    CAROM_STATIC,   /* never moves; its velocity must be zero */
+    CAROM_KINEMATIC /* moves with its given velocity whatever touches it */
+} carom_body_type;
+
+typedef enum carom_integrator {
+    CAROM_EULER /* the paper's step, corrected: EQUATIONS (1)-(7), (12), (14) */
+} carom_integrator;
+
+typedef enum carom_combine {
+    CAROM_COMBINE_MEAN, /* (a + b)/2, the paper's choice */
+    CAROM_COMBINE_GEOMETRIC,
+    CAROM_COMBINE_MIN,
+    CAROM_COMBINE_MAX
+} carom_combine;
+
+/* Settings of a world.  The table gives name, type, default, unit and meaning; scene files and
+ * `--set` use these names (carom_world_settings_set). */
+#define CAROM_WORLD_SETTINGS(X)                                                                    \
+    X(dt, double, 1.0 / 60, "s", "length of a step")                                               \
+    X(integrator, int, CAROM_EULER, "", "euler")                                                   \
+    X(combine_friction, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")                \
+    X(combine_restitution, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")             \
+    X(length, double, 0, "m", "length scale L; 0: largest diameter of a dynamic body's shape")     \
+    X(margin, double, 1e-6, "L", "gap below which a pair is in contact")                           \
+    X(penetration, double, 1e-9, "L", "overlap below which a new contact needs no shorter step")   \
+    X(rest_speed, double, 1e-3, "sqrt(g L)", "approach slower than this does not bounce")          \
+    X(max_substeps, int, 32, "1", "sub-steps of one step, at most")                                \
+    X(project_overlap, int, 1, "", "overlap of the initial scene: 1 projected away, 0 refused")    \
+    X(accept, double, 1e-10, "1", "residual of a solved contact problem")                          \
+    X(inexact, double, 1e-6, "1", "residual of a usable one")
+
+typedef struct carom_world_settings {
+#define CAROM_SETTING_FIELD(name, type, value, unit, text) type name;
+    CAROM_WORLD_SETTINGS(CAROM_SETTING_FIELD)
+#undef CAROM_SETTING_FIELD
+    double gravity[2]; /* [m/s^2], (0, -9.81) */
+} carom_world_settings;
+
+CAROM_API carom_world_settings carom_world_defaults(void);
+/* Sets one field by name from text ("margin", "1e-5"; "integrator", "euler").  CAROM_E_ARGUMENT for
+ * an unknown name or a value that is no such number or word; *reason (may be NULL) then says which
+ * in static text. */
+CAROM_API carom_status carom_world_settings_set(carom_world_settings *settings, const char *name,
+                                                const char *value, const char **reason);
+
+typedef struct carom_filter {
+    unsigned category; /* bits this body is; 1 */
+    unsigned mask;     /* bits it collides with; all */
+    int group;         /* equal and > 0: always collide; equal and < 0: never; 0: use the bits */
+} carom_filter;
+
+typedef struct carom_body_def {
+    carom_body_type type;
+    int n_shapes;              /* >= 0 */
+    const carom_shape *shapes; /* copied; vertices relative to the position = center of mass */
+    carom_pose pose;
+    double velocity[3];  /* (omega, vx, vy) [rad/s, m/s, m/s] */
+    double force[3];     /* constant (torque, fx, fy) [N m, N, N] */
+    double mass;         /* [kg], > 0 when dynamic */
+    double inertia;      /* about the center of mass [kg m^2], > 0 when dynamic */
+    double friction;     /* [1], >= 0 */
+    double restitution;  /* [1], 0 to 1 */
+    int collide;         /* 0: no contacts at all */
+    carom_filter filter;
+} carom_body_def;
+
+/* Dynamic, no shape, mass 1, inertia 1, friction 0.5, restitution 0, collides with all. */
+CAROM_API carom_body_def carom_body_defaults(void);
+
+typedef struct carom_world carom_world;
+
+/* settings, allocator: NULL for defaults. */
+CAROM_API carom_status carom_world_create(const carom_world_settings *settings,
+                                          const carom_allocator *allocator, carom_world **out);
+CAROM_API void carom_world_destroy(carom_world *world);
+
+/* The last error of this world in words: names the body, joint, shape, vertex and remedy.  Owned by
+ * the world, valid until its next call; "" when there was none. */
+CAROM_API const char *carom_world_error(const carom_world *world);
+
+/* Adds a body; *index (may be NULL) is its number.  CAROM_E_ARGUMENT, CAROM_E_SHAPE,
+ * CAROM_E_MEMORY; CAROM_E_STATE after the first step. */
+CAROM_API carom_status carom_world_add_body(carom_world *world, const carom_body_def *def,
+                                            int *index);
+/* Pins two bodies together at a world point, at their present poses.  At least one is dynamic.
+ * Joined bodies do not collide with each other. */
+CAROM_API carom_status carom_world_add_revolute(carom_world *world, int body_a, int body_b,
+                                                carom_vec2 anchor, int *index);
+
+/* Optional last call of building: freezes the scales L and g, checks the scene, projects or refuses
+ * initial overlap, allocates.  The first step does it when the caller did not. */
+CAROM_API carom_status carom_world_seal(carom_world *world);
+
+typedef struct carom_step_stats {
+    carom_status status;
+    double residual;     /* largest of the step's contact problems [1] */
+    double penetration;  /* largest overlap at the end [m], >= 0 */
+    double joint_drift;  /* largest position error of a joint at the end [m] */
+    double energy;       /* kinetic + gravitational at the end [J] */
+    int n_candidates;    /* pairs whose boxes touch */
+    int n_contacts;      /* contact points of the last sub-step */
+    int n_substeps;
+    int n_events;        /* impacts: sub-steps in which restitution acted or a step was shortened */
+    int factorizations;
+    int iterations;
+    int degenerate;      /* weakly active or stick/slip borderline contacts */
+    long allocations;    /* requests to the allocator during this step */
+    carom_contact_stage stage; /* deepest stage of the ladder used */
+} carom_step_stats;
+
+/* Advances by dt.  force: (torque, fx, fy) per body for this step, added to the constant forces;
+ * NULL: none.  stats may be NULL.  On a negative status the world is as it was. */
+CAROM_API carom_status carom_world_step(carom_world *world, const double *force,
+                                        carom_step_stats *stats);
+
+CAROM_API int carom_world_n_bodies(const carom_world *world);
+CAROM_API int carom_world_n_joints(const carom_world *world);
+/* Steps taken, and their time [s]. */
+CAROM_API long carom_world_steps(const carom_world *world);
+CAROM_API double carom_world_time(const carom_world *world);
+/* State, 3 n_bodies, owned by the world, valid until it changes. */
+CAROM_API const double *carom_world_q(const carom_world *world);
+CAROM_API const double *carom_world_v(const carom_world *world);
+/* Replaces the state (3 n_bodies each; NULL: keep); forgets guesses of the solver. */
+CAROM_API carom_status carom_world_set_state(carom_world *world, const double *q, const double *v);
+CAROM_API carom_world_settings carom_world_get_settings(const carom_world *world);
+CAROM_API double carom_world_energy(const carom_world *world);
+
+/* Parameters that may change between steps (and by gradient descent): arrays of n_bodies, NULL:
+ * keep.  Checked as in carom_body_def; nothing changes on an error. */
+typedef struct carom_parameters {
+    const double *mass;
+    const double *inertia;
+    const double *friction;
+    const double *restitution;
+    const double *gravity; /* 2 */
+} carom_parameters;
+CAROM_API carom_status carom_world_set_parameters(carom_world *world, const carom_parameters *p);
+
+/* One contact point of the last sub-step. */
+typedef struct carom_contact_info {
+    int body_a, body_b;
+    carom_vec2 point;    /* on A, world [m] */
+    carom_vec2 normal;   /* from A to B */
+    double gap;          /* at the start of the sub-step [m] */
+    double ln, lt;       /* impulses along normal and tangent [N s] */
+    carom_contact_mode mode;
+} carom_contact_info;
+CAROM_API int carom_world_n_contacts(const carom_world *world);
+CAROM_API carom_contact_info carom_world_contact(const carom_world *world, int k);
+
+/* Size of what the world holds, for `carom explain`. */
+typedef struct carom_world_size {
+    int n_dynamic, n_static, n_kinematic;
+    int n_shapes, n_vertices;
+    int n_joints;
+    int n_unknowns;    /* 3 per moving body */
+    int n_joint_rows;
+    int n_contacts;    /* last sub-step */
+    int n_friction;    /* ... of them with a tangential row */
+    int factor_nonzeros; /* of the last factorization */
+    size_t bytes;      /* held now */
+    size_t bytes_high; /* high-water mark */
+} carom_world_size;
+CAROM_API carom_world_size carom_world_measure(const carom_world *world);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
