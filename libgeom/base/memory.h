@@ -4,6 +4,7 @@
 
 #include "carom/base.h"
 
+#include <limits.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -29,7 +30,7 @@ static inline crm_memory crm_memory_from(const carom_allocator *a)
 static inline void *crm_new(crm_memory *m, size_t n, size_t size)
 {
     if (size && n > SIZE_MAX / 2 / size) return NULL;
-    const size_t bytes = n * size ? n * size : 1;
+    const size_t bytes = n * size > 0 ? n * size : 1;
     void *p = m->from.allocate(m->from.user, bytes);
     if (!p) return NULL;
     memset(p, 0, bytes);
@@ -43,7 +44,7 @@ static inline void *crm_new(crm_memory *m, size_t n, size_t size)
 static inline void crm_free(crm_memory *m, void *p, size_t n, size_t size)
 {
     if (!p) return;
-    const size_t bytes = n * size ? n * size : 1;
+    const size_t bytes = n * size > 0 ? n * size : 1;
     m->live -= bytes;
     m->from.release(m->from.user, p, bytes);
 }
@@ -53,9 +54,9 @@ static inline void crm_free(crm_memory *m, void *p, size_t n, size_t size)
 static inline carom_status crm_reserve(crm_memory *m, void **p, int *n_max, int need, size_t size)
 {
     if (need <= *n_max) return CAROM_OK;
-    int to = *n_max + *n_max / 2;
-    if (to < need || to < *n_max) to = need;
-    if (to < 8) to = 8;
+    int to = need < 8 ? 8 : need;
+    const int half = *n_max / 2;
+    if (*n_max <= INT_MAX - half && *n_max + half > to) to = *n_max + half;
     void *q = crm_new(m, (size_t)to, size);
     if (!q) return CAROM_E_MEMORY;
     if (*p) memcpy(q, *p, (size_t)*n_max * size);
