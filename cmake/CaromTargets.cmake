@@ -29,9 +29,17 @@ function(carom_flags target)
       -fno-sanitize-recover=all)
     target_link_options(${target} PUBLIC ${CAROM_SANITIZE_FLAG})
   endif()
+  if(BUILD_SHARED_LIBS)
+    file(RELATIVE_PATH to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
+    set_target_properties(${target} PROPERTIES INSTALL_RPATH "$ORIGIN;$ORIGIN/${to_lib}")
+    if(CMAKE_SYSTEM_NAME STREQUAL "Linux" AND NOT CAROM_SANITIZE)
+      target_link_options(${target} PRIVATE -Wl,--no-undefined)
+    endif()
+  endif()
 endfunction()
 
-# carom_library(name PUBLIC_INCLUDE dir SOURCES ...): libcarom_<name>, exported as carom::<name>.
+# carom_library(name EXPORT component INCLUDE dir SOURCES ...): libcarom_<name> (libcarom for
+# carom), exported as carom::<component>.
 function(carom_library name)
   cmake_parse_arguments(L "" "INCLUDE;EXPORT" "SOURCES" ${ARGN})
   add_library(carom_${name} ${L_SOURCES})
@@ -43,4 +51,23 @@ function(carom_library name)
     $<BUILD_INTERFACE:${L_INCLUDE}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   install(TARGETS carom_${name} EXPORT carom-targets
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  if(name STREQUAL carom)
+    set_target_properties(carom_carom PROPERTIES OUTPUT_NAME carom)
+  endif()
+  set_property(GLOBAL APPEND PROPERTY CAROM_LIBRARIES carom_${name})
+  if(BUILD_SHARED_LIBS AND CAROM_BUILD_TESTS)
+    carom_inside(carom_${name})
+  endif()
+endfunction()
+
+# carom_inside(library): <library>_inside, the same sources as a static library.  Tests look inside,
+# and a shared library hides its inside.
+function(carom_inside library)
+  add_library(${library}_inside STATIC EXCLUDE_FROM_ALL $<TARGET_PROPERTY:${library},SOURCES>)
+  carom_flags(${library}_inside)
+  target_include_directories(${library}_inside PUBLIC
+    $<TARGET_PROPERTY:${library},INCLUDE_DIRECTORIES>)
+  target_compile_definitions(${library}_inside PRIVATE
+    $<TARGET_PROPERTY:${library},COMPILE_DEFINITIONS>)
+  target_link_libraries(${library}_inside PUBLIC $<TARGET_PROPERTY:${library},LINK_LIBRARIES>)
 endfunction()

@@ -1,11 +1,15 @@
 # LCM (Lightweight Communications and Marshalling).  Debian ships no CMake files, and its .pc file
 # needs glib headers that carom does not: headers and library are looked for directly.
-# Target: LCM::lcm.  Variables: LCM_GEN (lcm-gen executable).
+# Target: LCM::lcm.  With the component gen also LCM_GEN, the executable lcm-gen.
 find_path(LCM_INCLUDE_DIR lcm/lcm.h)
 find_library(LCM_LIBRARY lcm)
 find_program(LCM_GEN lcm-gen)
 include(FindPackageHandleStandardArgs)
-find_package_handle_standard_args(LCM REQUIRED_VARS LCM_LIBRARY LCM_INCLUDE_DIR LCM_GEN
+set(required LCM_LIBRARY LCM_INCLUDE_DIR)
+if("gen" IN_LIST LCM_FIND_COMPONENTS)
+  list(APPEND required LCM_GEN)
+endif()
+find_package_handle_standard_args(LCM REQUIRED_VARS ${required}
   REASON_FAILURE_MESSAGE "install liblcm-dev and liblcm-bin, or set CAROM_BUILD_DAEMON=OFF and CAROM_BUILD_CLIENTS=OFF")
 if(LCM_FOUND AND NOT TARGET LCM::lcm)
   add_library(LCM::lcm UNKNOWN IMPORTED)
