@@ -1,4 +1,5 @@
 # How every carom target is compiled: usage requirements on targets, no global flags.
+include(CheckCSourceCompiles)
 
 if(CAROM_SANITIZE)
   set(known address undefined memory thread)
@@ -8,6 +9,14 @@ if(CAROM_SANITIZE)
     endif()
   endforeach()
   string(REPLACE ";" "," CAROM_SANITIZE_FLAG "-fsanitize=${CAROM_SANITIZE}")
+  string(MAKE_C_IDENTIFIER "CAROM_LINKS${CAROM_SANITIZE_FLAG}" links)
+  set(CMAKE_REQUIRED_FLAGS ${CAROM_SANITIZE_FLAG})
+  check_c_source_compiles("int main(void) { return 0; }" ${links})
+  unset(CMAKE_REQUIRED_FLAGS)
+  if(NOT ${links})
+    message(FATAL_ERROR
+      "CAROM_SANITIZE: ${CMAKE_C_COMPILER_ID} does not build with ${CAROM_SANITIZE_FLAG}")
+  endif()
 endif()
 
 # carom_flags(target): language, warnings, determinism, sanitizers.

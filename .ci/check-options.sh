@@ -1,0 +1,99 @@
+#!/bin/sh
+# check-options.sh quick|full FOLDER: every declared option, both ways.
+#   quick  configures each value and builds the libraries without KLU
+#   full   builds each value that is not the default, and runs the tests it leaves
+set -eu
+mode=$1
+mkdir -p "$2"
+work=$(cd "$2" && pwd)
+cd -- "$(dirname -- "$0")/.."
+jobs=${JOBS:-$(getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)}
+werror=${CAROM_WERROR:-OFF}
+
+fail() {
+    echo "options: $*" >&2
+    exit 1
+}
+
+# configure NAME OPTION...: a fresh folder; an option that no line of CMake reads is an error.
+configure() {
+    name=$1
+    shift
+    echo "--- $name: $*"
+    rm -rf "${work:?}/$name"
+    cmake -S . -B "$work/$name" "$@" >"$work/$name.log" 2>&1 || {
+        cat "$work/$name.log"
+        fail "$* does not configure"
+    }
+    if grep -A 5 'Manually-specified variables were not used' "$work/$name.log"; then
+        fail "$* is not read"
+    fi
+}
+
+refuse() {
+    echo "--- refused: $*"
+    rm -rf "${work:?}/refused"
+    if cmake -S . -B "$work/refused" "$@" >"$work/refused.log" 2>&1; then
+        fail "$* configures, and should not"
+    fi
+    grep -q 'CAROM_SANITIZE' "$work/refused.log" || fail "$*: the error does not name the option"
+}
+
+build() {
+    echo "    build $1"
+    cmake --build "$work/$1" --parallel "$jobs" >"$work/$1-build.log" 2>&1 || {
+        tail -n 50 "$work/$1-build.log"
+        fail "$1 does not build"
+    }
+}
+
+run_tests() {
+    [ -f "$work/$1/CTestTestfile.cmake" ] || return 0
+    (cd "$work/$1" && ctest --output-on-failure -LE long -j "$jobs") >"$work/$1-test.log" 2>&1 || {
+        tail -n 50 "$work/$1-test.log"
+        fail "$1: tests fail"
+    }
+    grep 'tests passed' "$work/$1-test.log" || true
+}
+
+options="BUILD_SHARED_LIBS CAROM_BUILD_WORLD CAROM_BUILD_DAEMON CAROM_BUILD_CLIENTS CAROM_WITH_KLU
+CAROM_BUILD_TESTS CAROM_BUILD_BENCH CAROM_BUILD_EXAMPLES CAROM_CHECKS CAROM_WERROR"
+declared=$(sed -n 's/^option(\([A-Z_]*\).*/\1/p' CMakeLists.txt)
+for option in $declared; do
+    case " $(echo "$options" | tr '\n' ' ') " in
+    *" $option "*) ;;
+    *) fail "$option is declared, but not checked here" ;;
+    esac
+    grep -q "$option" docs/development.md || fail "$option is not in docs/development.md"
+done
+
+default() {
+    sed -n "s/^option($1 .* \([^ ]*\))\$/\1/p" CMakeLists.txt | sed 's/.{CAROM_TOP}/ON/'
+}
+
+for option in $options; do
+    for value in ON OFF; do
+        name=$option-$value
+        if [ "$mode" = quick ]; then
+            configure "$name" "-D$option=$value"
+        elif [ "$(default "$option")" != $value ]; then
+            set -- "-D$option=$value"
+            [ "$option" = CAROM_WERROR ] || set -- "$@" "-DCAROM_WERROR=$werror"
+            configure "$name" "$@"
+            build "$name"
+            run_tests "$name"
+        fi
+    done
+done
+for value in '' 'address;undefined' thread; do
+    configure "sanitize-$value" "-DCAROM_SANITIZE=$value"
+done
+refuse -DCAROM_SANITIZE=everything
+refuse '-DCAROM_SANITIZE=address;thread'
+refuse -DCAROM_SANITIZE=memory -DCMAKE_C_COMPILER=gcc
+if [ "$mode" = quick ]; then
+    configure no-klu -DCAROM_WITH_KLU=OFF -DCAROM_BUILD_TESTS=OFF -DCAROM_BUILD_EXAMPLES=OFF \
+        -DCAROM_BUILD_DAEMON=OFF -DCAROM_BUILD_CLIENTS=OFF "-DCAROM_WERROR=$werror"
+    build no-klu
+fi
+echo "every option works both ways"
