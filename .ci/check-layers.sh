@@ -23,6 +23,7 @@ layer() {
     libsolver/world/* | libsolver/include/carom/world.h) layer=world ;;
     libsolver/grad/* | libsolver/include/carom/grad.h) layer=grad ;;
     libsolver/include/carom/carom.h) layer=all ;;
+    proto/*) layer=proto ;;
     daemon/*) layer=daemon ;;
     clients/*) layer=clients ;;
     *) layer=unknown ;;
@@ -39,8 +40,9 @@ allowed() {
     world) allowed="base geom lcp contact world" ;;
     grad) allowed="base geom lcp contact world grad" ;;
     all) allowed="base geom lcp contact world grad" ;;
-    daemon) allowed="base geom lcp contact world grad all daemon" ;;
-    clients) allowed="base geom lcp contact world grad all clients" ;;
+    proto) allowed=proto ;;
+    daemon) allowed="base geom lcp contact world grad all proto daemon" ;;
+    clients) allowed="base geom lcp contact world grad all proto clients" ;;
     esac
 }
 
@@ -48,13 +50,13 @@ allowed() {
 # for generated messages and other people's headers.
 resolve() {
     for found in "${1%/*}/$2" "$2" "libgeom/include/$2" "libsolver/include/$2" \
-        "clients/c/include/$2" "libgeom/$2" "libsolver/$2" "daemon/$2" "clients/c/$2"; do
+        "clients/c/include/$2" "libgeom/$2" "libsolver/$2" "proto/$2" "daemon/$2" "clients/c/$2"; do
         [ ! -f "$found" ] || return 0
     done
     found=
 }
 
-sources=$(find libgeom libsolver daemon clients -name '*.[ch]' | sort)
+sources=$(find libgeom libsolver proto daemon clients -name '*.[ch]' | sort)
 includes=$(mktemp)
 trap 'rm -f "$includes"' EXIT
 # The sources are words on purpose: no name has a blank.
@@ -93,7 +95,7 @@ while IFS=: read -r file line text; do
     esac
     # Clients use what a user has: public headers.
     case $mine:$layer:$found in
-    clients:clients:* | clients:*/include/carom/*) ;;
+    clients:clients:* | clients:proto:* | clients:*/include/carom/*) ;;
     clients:*) error "$file:$line: a client includes the internal \"$name\"" ;;
     esac
 done <"$includes"

@@ -22,7 +22,7 @@ configure() {
     echo "--- $name: $*"
     rm -rf "${work:?}/$name"
     cmake -S . -B "$work/$name" "$@" >"$work/$name.log" 2>&1 || {
-        cat "$work/$name.log"
+        tail -n 50 "$work/$name.log"
         fail "$* does not configure"
     }
     if grep -A 5 'Manually-specified variables were not used' "$work/$name.log"; then
@@ -86,7 +86,7 @@ for option in $options; do
     done
 done
 for value in '' 'address;undefined' thread; do
-    configure "sanitize-$value" "-DCAROM_SANITIZE=$value"
+    configure "sanitize-$(echo "$value" | tr ';' '-')" "-DCAROM_SANITIZE=$value"
 done
 refuse -DCAROM_SANITIZE=everything
 refuse '-DCAROM_SANITIZE=address;thread'
