@@ -45,6 +45,7 @@ typedef struct carom_gradient {
     double *gravity;     /* 2 */
     double *force;       /* 3 n_bodies: a constant force on each body through all steps */
     double *force_steps; /* 3 n_bodies x steps: the force of each step */
+    double *dt;          /* 1: length of the step */
     double *radius;      /* n_shapes, in the order of adding */
     carom_vec2 *vertices;/* n_vertices, in the order of adding; body frame */
     carom_vec2 *anchors; /* 2 n_joints: anchor in the frame of body A, then of body B */

@@ -1,0 +1,246 @@
+/* gradient.c: the reverse pass over a tape: events, step borders, losses.  docs/gradient.md. */
+#include "grad/internal.h"
+#include "world/block.h"
+
+#include <math.h>
+
+/* An event whose gap closes slower than this [1/s of L] has no usable derivative of its time. */
+static const double GRAZING = 1e-9;
+
+static int most_contacts(const carom_tape *t)
+{
+    int n = 0;
+    for (int k = 0; k < t->n_records; k++) {
+        if (t->records[k].s.n_contacts > n) n = t->records[k].s.n_contacts;
+    }
+    return n;
+}
+
+static void lay(crm_reverse *r, crm_block *b, size_t m)
+{
+    const size_t n3 = 3 * (size_t)r->world->n_bodies;
+    const size_t k3 = 3 * (size_t)r->world->n_moving;
+    const size_t rows = 2 * (size_t)r->world->n_joints;
+    double **const full[5] = {&r->q_bar, &r->v_bar, &r->q_seed, &r->v_seed, &r->q_event};
+    for (int k = 0; k < 5; k++) *full[k] = crm_carve(b, n3, sizeof(double));
+    r->velocity_bar = crm_carve(b, k3, sizeof(double));
+    r->bars.u = crm_carve(b, k3, sizeof(double));
+    r->bars.inv_mass = crm_carve(b, k3, sizeof(double));
+    r->bars.jn = crm_carve(b, 6 * m, sizeof(double));
+    r->bars.jt = crm_carve(b, 6 * m, sizeof(double));
+    r->bars.mu = crm_carve(b, m, sizeof(double));
+    r->bars.cn = crm_carve(b, m, sizeof(double));
+    r->bars.je = crm_carve(b, 6 * rows, sizeof(double));
+    r->bars.ce = crm_carve(b, rows, sizeof(double));
+    r->moved = crm_carve(b, m, sizeof *r->moved);
+    r->moved_lt = crm_carve(b, m, sizeof(double));
+}
+
+static carom_status allocate(crm_reverse *r)
+{
+    const int m = most_contacts(r->tape);
+    const carom_status e = crm_rows_reserve(r->world, m);
+    if (e) return e;
+    crm_block b = {NULL, 0};
+    lay(r, &b, (size_t)m);
+    r->bytes = b.used;
+    r->block = crm_new(&r->tape->memory, b.used, 1);
+    if (!r->block) return CAROM_E_MEMORY;
+    b.base = r->block;
+    b.used = 0;
+    lay(r, &b, (size_t)m);
+    return CAROM_OK;
+}
+
+static void clear(double *x, size_t n)
+{
+    if (x && n) memset(x, 0, n * sizeof *x);
+}
+
+static void clear_sink(const crm_reverse *r)
+{
+    const carom_gradient *g = &r->sink.g;
+    const carom_world *w = r->world;
+    const size_t n = (size_t)w->n_bodies;
+    clear(g->mass, n);
+    clear(g->inertia, n);
+    clear(g->friction, n);
+    clear(g->restitution, n);
+    clear(g->gravity, 2);
+    clear(g->force, 3 * n);
+    clear(g->force_steps, 3 * n * (size_t)r->tape->n_frames);
+    clear(g->dt, 1);
+    clear(g->radius, (size_t)w->n_shapes);
+    clear((double *)g->vertices, 2 * (size_t)w->n_vertices);
+    clear((double *)g->anchors, 4 * (size_t)w->n_joints);
+}
+
+/* q1 and v1 of a sub-step are the start of the next one. */
+static void end_state(const carom_tape *t, int record, crm_substep *s)
+{
+    const int last = record + 1 == t->n_records;
+    s->q1 = last ? t->q_end : t->records[record + 1].s.q0;
+    s->v1 = last ? t->v_end : t->records[record + 1].s.v0;
+}
+
+/* d gap / d q1 of the closing contact; scaled parameters go to the sink when scale is not 0. */
+static void event_vjp(crm_reverse *r, const crm_substep *s, double *q_event)
+{
+    const carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, 1};
+    clear(q_event, 3 * (size_t)r->world->n_bodies);
+    crm_geometry_vjp(r, s->q1, &s->event, &bar, q_event, 0);
+}
+
+static void event_parameters(crm_reverse *r, const crm_substep *s, double scale)
+{
+    const carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, scale};
+    clear(r->q_seed, 3 * (size_t)r->world->n_bodies);
+    crm_geometry_vjp(r, s->q1, &s->event, &bar, r->q_seed, 1);
+}
+
+/* The sub-step ended at the root h* of a gap g: dh* = -(dg/dtheta) / (dg/dh).  With
+ * H = h_bar - left_bar, the cotangent of h*, every derivative of g enters with k = -H / (dg/dh):
+ * the seed k dg/dq1 is added to q_bar, and k dg/dparameter to the sink. */
+static carom_status locate_vjp(crm_reverse *r, const crm_substep *s, double left_bar)
+{
+    const size_t n3 = 3 * (size_t)r->world->n_bodies;
+    double h_bar;
+    double slope;
+    event_vjp(r, s, r->q_event);
+    memcpy(r->q_seed, r->q_bar, n3 * sizeof(double));
+    memcpy(r->v_seed, r->v_bar, n3 * sizeof(double));
+    carom_status e = crm_substep_vjp(r, s, r->q_seed, r->v_seed, 0, &h_bar);
+    if (e < 0) return e;
+    memcpy(r->q_seed, r->q_event, n3 * sizeof(double));
+    clear(r->v_seed, n3);
+    e = crm_substep_vjp(r, s, r->q_seed, r->v_seed, 0, &slope);
+    if (e < 0) return e;
+    if (fabs(slope) <= GRAZING * r->world->length) {
+        r->stats.degenerate++;
+        return CAROM_OK;
+    }
+    const double k = -(h_bar - left_bar) / slope;
+    for (size_t i = 0; i < n3; i++) r->q_bar[i] += k * r->q_event[i];
+    event_parameters(r, s, k);
+    return CAROM_OK;
+}
+
+/* One sub-step backward; *left_bar is the cotangent of the time left after it, then before it. */
+static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
+{
+    crm_substep s = r->tape->records[record].s;
+    double h_bar;
+    end_state(r->tape, record, &s);
+    if (s.end == CRM_END_EVENT) {
+        const carom_status e = locate_vjp(r, &s, *left_bar);
+        if (e < 0) return e;
+    }
+    const carom_status e = crm_substep_vjp(r, &s, r->q_bar, r->v_bar, 1, &h_bar);
+    if (e < 0) return e;
+    r->stats.degenerate += s.degenerate;
+    switch (s.end) {
+    case CRM_END_FRAME: *left_bar = h_bar; break;
+    case CRM_END_FRACTION: *left_bar = s.fraction * h_bar + (1 - s.fraction) * *left_bar; break;
+    case CRM_END_EVENT: break; /* left_before = left_after + h*, and h* is in k */
+    }
+    return CAROM_OK;
+}
+
+/* Adds the losses on the state after `step` steps.  A step that ended with an event owes the time
+ * `carry` = 0 to the next one; the state at the border moves with it at (v, W f + g). */
+static void add_bars(crm_reverse *r, int step, int n_bars, const carom_state_bar *bars,
+                     double *carry_bar)
+{
+    const carom_tape *t = r->tape;
+    const carom_world *w = r->world;
+    const double *v = carom_tape_v(t, step);
+    const double *f = step > 0 ? t->frames[step - 1].force : NULL;
+    for (int i = 0; i < n_bars; i++) {
+        if (bars[i].step != step) continue;
+        for (int k = 0; k < 3 * w->n_bodies; k++) {
+            const int b = k / 3;
+            const int falls = w->bodies[b].type == CAROM_DYNAMIC;
+            const double W = !falls ? 0 : k % 3 ? 1 / w->mass[b] : 1 / w->inertia[b];
+            const double g = falls && k % 3 ? w->settings.gravity[k % 3 - 1] : 0;
+            const double q_bar = bars[i].q ? bars[i].q[k] : 0;
+            const double v_bar = bars[i].v ? bars[i].v[k] : 0;
+            r->q_bar[k] += q_bar;
+            r->v_bar[k] += v_bar;
+            *carry_bar += q_bar * v[k] + v_bar * (f ? W * f[k] + g : 0);
+        }
+    }
+}
+
+static carom_status reverse_frame(crm_reverse *r, int frame, double *left_bar)
+{
+    const carom_tape *t = r->tape;
+    const int first = t->frames[frame].first_record;
+    const int end = frame + 1 < t->n_frames ? t->frames[frame + 1].first_record : t->n_records;
+    const int before = r->stats.degenerate;
+    double *steps = r->sink.g.force_steps;
+    r->sink.force_step = steps ? steps + 3 * (size_t)r->world->n_bodies * (size_t)frame : NULL;
+    for (int k = end - 1; k >= first; k--) {
+        const carom_status e = reverse_record(r, k, left_bar);
+        if (e < 0) return e;
+    }
+    if (r->sink.g.dt) *r->sink.g.dt += *left_bar;
+    if (r->stats.degenerate > before) r->stats.first_degenerate_step = frame + 1;
+    return CAROM_OK;
+}
+
+static carom_status reverse_all(crm_reverse *r, int n_bars, const carom_state_bar *bars)
+{
+    const size_t n3 = 3 * (size_t)r->world->n_bodies;
+    double left_bar = 0;
+    clear(r->q_bar, n3);
+    clear(r->v_bar, n3);
+    clear_sink(r);
+    r->stats.first_degenerate_step = -1;
+    for (int frame = r->tape->n_frames - 1; frame >= 0; frame--) {
+        add_bars(r, frame + 1, n_bars, bars, &left_bar);
+        const carom_status e = reverse_frame(r, frame, &left_bar);
+        if (e < 0) return e;
+    }
+    add_bars(r, 0, n_bars, bars, &left_bar);
+    for (int b = 0; b < r->world->n_bodies; b++) {
+        if (r->world->bodies[b].type == CAROM_STATIC) clear(&r->v_bar[3 * b], 3);
+    }
+    if (r->sink.g.q0) memcpy(r->sink.g.q0, r->q_bar, n3 * sizeof(double));
+    if (r->sink.g.v0) memcpy(r->sink.g.v0, r->v_bar, n3 * sizeof(double));
+    return CAROM_OK;
+}
+
+static carom_status check(const carom_tape *t, int n_bars, const carom_state_bar *bars)
+{
+    if (n_bars < 0 || (n_bars > 0 && !bars)) return CAROM_E_ARGUMENT;
+    for (int i = 0; i < n_bars; i++) {
+        if (bars[i].step < 0 || bars[i].step > t->n_frames) {
+            return crm_world_fail(t->world, CAROM_E_ARGUMENT,
+                                  "loss at step %d, but the tape has %d steps", bars[i].step,
+                                  t->n_frames);
+        }
+    }
+    if (t->revision != t->world->revision) {
+        return crm_world_fail(t->world, CAROM_E_STATE,
+                              "parameters changed since the recording; rewind and run again");
+    }
+    return CAROM_OK;
+}
+
+carom_status carom_tape_gradient(carom_tape *tape, int n_bars, const carom_state_bar *bars,
+                                 const carom_gradient *gradient, carom_gradient_stats *stats)
+{
+    if (!tape || !gradient) return CAROM_E_ARGUMENT;
+    carom_status e = check(tape, n_bars, bars);
+    if (e) return e;
+    crm_reverse r = {0};
+    r.tape = tape;
+    r.world = tape->world;
+    r.sink.g = *gradient;
+    e = allocate(&r);
+    if (!e) e = reverse_all(&r, n_bars, bars);
+    crm_free(&tape->memory, r.block, r.bytes, 1);
+    if (e < 0) return crm_world_fail(tape->world, e, "gradient: %s", carom_status_text(e));
+    if (stats) *stats = r.stats;
+    return CAROM_OK;
+}

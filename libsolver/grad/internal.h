@@ -1,0 +1,68 @@
+/* internal.h: what the reverse pass works with. */
+#ifndef CRM_GRAD_INTERNAL_H
+#define CRM_GRAD_INTERNAL_H
+
+#include "carom/grad.h"
+#include "world/internal.h"
+
+/* One recorded sub-step: a crm_substep whose arrays lie in one block of exact size. */
+typedef struct crm_record {
+    crm_substep s;
+    void *block;
+    size_t bytes;
+} crm_record;
+
+/* One recorded step. */
+typedef struct crm_frame {
+    int first_record; /* of this step */
+    double *force;    /* 3 n_bodies */
+} crm_frame;
+
+struct carom_tape {
+    crm_memory memory;
+    carom_world *world;
+    long revision; /* the world's when the recording began */
+    int n_records, max_records;
+    crm_record *records;
+    int n_frames, max_frames;
+    crm_frame *frames;
+    double *q_end, *v_end; /* 3 n_bodies: state after the last recorded step */
+    int n_bodies;
+};
+
+/* Cotangents of the parameters; NULL where not wanted. */
+typedef struct crm_sink {
+    carom_gradient g;
+    double *force_step; /* 3 n_bodies: row of g.force_steps for the step under way */
+} crm_sink;
+
+/* Workspace of a reverse pass. */
+typedef struct crm_reverse {
+    carom_tape *tape;
+    carom_world *world;
+    crm_sink sink;
+    double *q_bar, *v_bar; /* 3 n_bodies: state under way */
+    double *q_seed, *v_seed;
+    double *q_event;      /* 3 n_bodies: d gap / d q1 */
+    double *velocity_bar; /* 3 n_moving */
+    carom_contact_bars bars;
+    crm_contact *moved; /* contacts at the pose of a correction */
+    double *moved_lt;
+    void *block;
+    size_t bytes;
+    carom_gradient_stats stats;
+} crm_reverse;
+
+/* geometry.c: reverse derivatives of rows and gaps; each adds. */
+void crm_contact_rows_vjp(const crm_contact *c, const double jn_bar[6], const double jt_bar[6],
+                          carom_contact_bar *bar);
+void crm_geometry_vjp(crm_reverse *r, const double *q, const crm_contact *c,
+                      const carom_contact_bar *bar, double *q_bar, int with_parameters);
+void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double je_bar[12],
+                   const double *error_bar, double *q_bar, int with_parameters);
+
+/* reverse.c: from (q_bar, v_bar) at the end of a sub-step to its start, in place; adds to the sink
+ * when with_parameters; *h_bar is the cotangent of h. */
+carom_status crm_substep_vjp(crm_reverse *r, const crm_substep *s, double *q_bar, double *v_bar,
+                             int with_parameters, double *h_bar);
+#endif

@@ -1,0 +1,186 @@
+/* detect.c: which shapes may touch, and where they do. */
+#include "world/internal.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static long body_key(const carom_world *w, int a, int b)
+{
+    return a < b ? (long)a * w->n_bodies + b : (long)b * w->n_bodies + a;
+}
+
+static int compare_keys(const void *x, const void *y)
+{
+    const long a = *(const long *)x;
+    const long b = *(const long *)y;
+    return (a > b) - (a < b);
+}
+
+static int joined(const carom_world *w, int a, int b)
+{
+    if (!w->n_joints) return 0;
+    const long key = body_key(w, a, b);
+    return bsearch(&key, w->joined, (size_t)w->n_joints, sizeof key, compare_keys) != NULL;
+}
+
+void crm_sort_joined(carom_world *w)
+{
+    for (int k = 0; k < w->n_joints; k++) {
+        w->joined[k] = body_key(w, w->joints[k].body_a, w->joints[k].body_b);
+    }
+    qsort(w->joined, (size_t)w->n_joints, sizeof *w->joined, compare_keys);
+}
+
+static int filters_meet(const crm_body *a, const crm_body *b)
+{
+    if (a->filter.group && a->filter.group == b->filter.group) return a->filter.group > 0;
+    return (a->filter.category & b->filter.mask) && (b->filter.category & a->filter.mask);
+}
+
+int crm_may_collide(const carom_world *w, carom_pair pair)
+{
+    const int ia = w->shapes[pair.a].body;
+    const int ib = w->shapes[pair.b].body;
+    const crm_body *a = &w->bodies[ia];
+    const crm_body *b = &w->bodies[ib];
+    if (ia == ib || !a->collide || !b->collide) return 0;
+    if (a->type != CAROM_DYNAMIC && b->type != CAROM_DYNAMIC) return 0;
+    return filters_meet(a, b) && !joined(w, ia, ib);
+}
+
+static carom_box grown(carom_box x, double margin)
+{
+    const carom_box y = {{x.lower.x - margin, x.lower.y - margin},
+                         {x.upper.x + margin, x.upper.y + margin}};
+    return y;
+}
+
+static carom_box joined_box(carom_box a, carom_box b)
+{
+    const carom_box c = {{fmin(a.lower.x, b.lower.x), fmin(a.lower.y, b.lower.y)},
+                         {fmax(a.upper.x, b.upper.x), fmax(a.upper.y, b.upper.y)}};
+    return c;
+}
+
+carom_status crm_candidates(carom_world *w, const double *q0, const double *q1, double margin,
+                            int *n_pairs, const carom_pair **pairs)
+{
+    for (int k = 0; k < w->n_shapes; k++) {
+        const crm_shape *s = &w->shapes[k];
+        carom_box box = carom_shape_box(&s->view, crm_pose(q0, s->body));
+        if (q1 != q0) box = joined_box(box, carom_shape_box(&s->view, crm_pose(q1, s->body)));
+        w->boxes[k] = grown(box, 0.5 * margin);
+    }
+    return carom_broadphase_pairs(w->broadphase, w->n_shapes, w->boxes, n_pairs, pairs);
+}
+
+carom_manifold crm_collide(const carom_world *w, carom_pair pair, const double *q, double margin)
+{
+    const crm_shape *a = &w->shapes[pair.a];
+    const crm_shape *b = &w->shapes[pair.b];
+    return carom_collide(&a->view, crm_pose(q, a->body), &b->view, crm_pose(q, b->body), margin);
+}
+
+static carom_pose pose_between(const double *q0, const double *q1, int body, double at)
+{
+    const double *a = q0 + 3 * body;
+    const double *b = q1 + 3 * body;
+    const carom_pose p = {a[0] + at * (b[0] - a[0]), a[1] + at * (b[1] - a[1]),
+                          a[2] + at * (b[2] - a[2])};
+    return p;
+}
+
+double crm_distance_between(const carom_world *w, carom_pair pair, const double *q0,
+                            const double *q1, double at)
+{
+    const crm_shape *a = &w->shapes[pair.a];
+    const crm_shape *b = &w->shapes[pair.b];
+    return carom_collide(&a->view, pose_between(q0, q1, a->body, at), &b->view,
+                         pose_between(q0, q1, b->body, at), 0)
+        .distance;
+}
+
+crm_contact crm_contact_of(const carom_world *w, carom_pair pair, const carom_manifold *m, int k)
+{
+    crm_contact c = {0};
+    c.shape_a = pair.a;
+    c.shape_b = pair.b;
+    c.body_a = w->shapes[pair.a].body;
+    c.body_b = w->shapes[pair.b].body;
+    c.recipe = m->points[k].recipe;
+    c.normal = m->normal;
+    c.arm_a = m->points[k].arm_a;
+    c.arm_b = m->points[k].arm_b;
+    c.gap = m->points[k].gap;
+    return c;
+}
+
+static carom_status add_contacts(carom_world *w, carom_pair pair, const carom_manifold *m,
+                                 double margin)
+{
+    crm_substep *s = &w->sub;
+    const carom_status e = crm_substep_reserve(w, s, s->n_contacts + m->count);
+    if (e) return e;
+    for (int k = 0; k < m->count; k++) {
+        crm_contact *c = &s->contacts[s->n_contacts++];
+        *c = crm_contact_of(w, pair, m, k);
+        c->speculative = c->gap > margin;
+    }
+    return crm_rows_reserve(w, s->n_contacts);
+}
+
+carom_status crm_detect(carom_world *w, const double *q, double margin)
+{
+    int n;
+    const carom_pair *pairs;
+    carom_status e = crm_candidates(w, q, q, margin, &n, &pairs);
+    w->sub.n_contacts = 0;
+    for (int k = 0; e >= 0 && k < n; k++) {
+        if (!crm_may_collide(w, pairs[k])) continue;
+        const carom_manifold m = crm_collide(w, pairs[k], q, margin);
+        if (m.count) e = add_contacts(w, pairs[k], &m, margin);
+    }
+    return e;
+}
+
+/* How far a point of the body can get within h at velocity v [m]. */
+static double travel(const carom_world *w, int shape, const double *v, double h)
+{
+    const crm_shape *s = &w->shapes[shape];
+    const double *vb = v + 3 * s->body;
+    return h * (hypot(vb[1], vb[2]) + fabs(vb[0]) * s->reach);
+}
+
+carom_status crm_detect_ahead(carom_world *w, const double *q, const double *v, double h,
+                              double margin)
+{
+    int n;
+    const carom_pair *pairs;
+    double longest = 0;
+    for (int k = 0; k < w->n_shapes; k++) longest = fmax(longest, travel(w, k, v, h));
+    carom_status e = crm_candidates(w, q, q, margin + 2 * longest, &n, &pairs);
+    w->sub.n_contacts = 0;
+    for (int k = 0; e >= 0 && k < n; k++) {
+        if (!crm_may_collide(w, pairs[k])) continue;
+        const double reach = travel(w, pairs[k].a, v, h) + travel(w, pairs[k].b, v, h);
+        const carom_manifold m = crm_collide(w, pairs[k], q, margin + reach);
+        if (m.count) e = add_contacts(w, pairs[k], &m, margin);
+    }
+    return e;
+}
+
+void crm_contact_refresh(const carom_world *w, const double *q, crm_contact *c)
+{
+    const carom_contact_point p = carom_contact_eval(
+        &w->shapes[c->shape_a].view, crm_pose(q, c->body_a), &w->shapes[c->shape_b].view,
+        crm_pose(q, c->body_b), c->recipe, &c->normal);
+    c->arm_a = p.arm_a;
+    c->arm_b = p.arm_b;
+    c->gap = p.gap;
+}
+
+int crm_recipe_same(carom_recipe a, carom_recipe b)
+{
+    return a.ref == b.ref && a.inc == b.inc && a.kernel == b.kernel && a.flipped == b.flipped &&
+           a.at_end == b.at_end;
+}

@@ -1,0 +1,258 @@
+/* internal.h: the data of a world and the parts of its step, shared by world/ and grad/. */
+#ifndef CRM_WORLD_INTERNAL_H
+#define CRM_WORLD_INTERNAL_H
+
+#include "base/memory.h"
+#include "carom/broadphase.h"
+#include "carom/collide.h"
+#include "carom/world.h"
+
+/* Newton corrections of the position constraints after a sub-step, at most: the error is squared by
+ * each, so that four reach rounding level from 1e-2. */
+#define CRM_MAX_PROJECTIONS 4
+
+typedef struct crm_body {
+    carom_body_type type;
+    int first_shape;
+    int n_shapes;
+    int collide;
+    int unknown; /* index among the moving bodies, -1: static */
+    carom_filter filter;
+} crm_body;
+
+typedef struct crm_shape {
+    carom_shape view; /* its vertices live in carom_world.vertices */
+    int body;
+    int first_vertex;
+    double reach;     /* farthest point from the body's position [m]; set by seal */
+    double thickness; /* smallest width over the edge normals [m]; set by seal */
+} crm_shape;
+
+/* A revolute joint: anchors in the frames of its bodies. */
+typedef struct crm_joint {
+    int body_a;
+    int body_b;
+    carom_vec2 local_a;
+    carom_vec2 local_b;
+} crm_joint;
+
+/* A contact point between two shapes at the pose where it was evaluated. */
+typedef struct crm_contact {
+    int shape_a;
+    int shape_b;
+    int body_a;
+    int body_b;
+    carom_recipe recipe;
+    carom_vec2 normal;
+    carom_vec2 arm_a;
+    carom_vec2 arm_b;
+    double gap;
+    int speculative; /* 1: not touching; constrained by J_n v + gap/h >= 0 */
+} crm_contact;
+
+typedef enum crm_end {
+    CRM_END_FRAME,    /* h is all the time that was left */
+    CRM_END_FRACTION, /* h = fraction * left, fraction constant */
+    CRM_END_EVENT     /* h is the root of the gap of `event` */
+} crm_end;
+
+/* One position correction q + d: the frictionless problem at q with c_n = gap, c_e = joint error.
+ */
+typedef struct crm_projection {
+    double *q;           /* 3 n_bodies: before */
+    double *ln;          /* per contact */
+    double *le;          /* per joint row */
+    unsigned char *mode; /* per contact */
+} crm_projection;
+
+/* Everything about one sub-step: what the reverse pass needs, no more. */
+typedef struct crm_substep {
+    double h;            /* [s] */
+    double *q0, *v0;     /* 3 n_bodies */
+    double *q1, *v1;     /* 3 n_bodies */
+    const double *force; /* 3 n_bodies: (torque, fx, fy) of the step */
+    int degenerate;      /* weakly active or stick/slip borderline contacts */
+    int n_contacts;
+    int max_contacts;
+    crm_contact *contacts; /* geometry at q0 */
+    crm_contact *moved;    /* the same contacts at the pose of the latest correction */
+    double *moved_lt;      /* zeros: corrections have no friction */
+    double *ln, *lt;       /* per contact */
+    double *cn;            /* per contact: restitution or speculative gap / h */
+    unsigned char *mode;   /* per contact */
+    double *le;            /* per joint row */
+    double restitution;    /* factor on all restitutions: 1, or 0 when relaxed */
+    int n_projections;
+    crm_projection projection[CRM_MAX_PROJECTIONS];
+    crm_end end;
+    double fraction;
+    crm_contact event; /* the contact that closes at q1 */
+    void *state_block; /* one block each: states; contacts */
+    size_t state_bytes;
+    void *contact_block;
+    size_t contact_bytes;
+} crm_substep;
+
+/* Arrays of one contact problem, sized for the world. */
+typedef struct crm_rows {
+    int max_contacts;
+    int *contact_body;
+    double *jn, *jt, *mu, *cn;
+    double *zero; /* max_contacts zeros: friction of projections */
+    int *joint_body;
+    double *je, *ce;
+    double *u;        /* 3 n_moving */
+    double *v;        /* 3 n_moving: solution */
+    double *inv_mass; /* 3 n_moving */
+    void *fixed_block;
+    size_t fixed_bytes;
+    void *contact_block;
+    size_t contact_bytes;
+} crm_rows;
+
+/* A contact and how it was: the first guess for the next sub-step. */
+typedef struct crm_guess {
+    int shape_a;
+    int shape_b;
+    carom_recipe recipe;
+    unsigned char mode;
+} crm_guess;
+
+/* Told of every accepted sub-step and of the end of every step. */
+typedef struct crm_recorder {
+    carom_status (*substep)(void *user, const crm_substep *s);
+    void *user;
+} crm_recorder;
+
+struct carom_world {
+    crm_memory memory;
+    carom_world_settings settings;
+    char error[256];
+
+    int n_bodies, max_bodies;
+    crm_body *bodies;
+    double *q, *v;                                   /* 3 n_bodies */
+    double *force;                                   /* 3 n_bodies: constant */
+    double *mass, *inertia, *friction, *restitution; /* n_bodies */
+    void *body_block;                                /* holds the eight arrays above */
+    size_t body_bytes;
+    int n_shapes, max_shapes;
+    crm_shape *shapes;
+    int n_vertices, max_vertices;
+    carom_vec2 *vertices;
+    int n_joints, max_joints;
+    crm_joint *joints;
+
+    /* From here on: made by seal. */
+    int sealed;
+    int n_moving;
+    double length;     /* L [m] */
+    double rest_speed; /* v_rest [m/s] */
+    void *seal_block;  /* the arrays made by seal */
+    size_t seal_bytes;
+    double *step_force; /* 3 n_bodies: of the present step, constant + given */
+    carom_box *boxes;   /* n_shapes */
+    long *joined;       /* sorted keys of joined body pairs */
+    carom_broadphase *broadphase;
+    carom_contact_solver *solver;
+    crm_rows rows;
+    crm_substep sub;
+    double *q_saved, *v_saved; /* 3 n_bodies: for a failed step */
+    int n_guess, max_guess;    /* contacts and modes of the last accepted sub-step */
+    crm_guess *guess;
+    long revision; /* counts changes of parameters */
+    double carry;  /* time owed to the next step: always 0, but with a derivative */
+    long n_steps;
+    double time;
+    carom_step_stats *stats; /* of the step under way */
+    crm_recorder recorder;
+};
+
+/* error.c: sets world->error and returns status. */
+#ifdef __GNUC__
+__attribute__((format(printf, 3, 4)))
+#endif
+carom_status
+crm_world_fail(carom_world *w, carom_status status, const char *format, ...);
+
+static inline carom_pose crm_pose(const double *q, int body)
+{
+    const carom_pose p = {q[3 * body], q[3 * body + 1], q[3 * body + 2]};
+    return p;
+}
+
+/* A moving body's index in contact problems; -1 for static ones. */
+static inline int crm_unknown(const carom_world *w, int body)
+{
+    return w->bodies[body].unknown;
+}
+
+/* build.c: room for one more body; also makes the arrays of an empty world. */
+carom_status crm_reserve_bodies(carom_world *w);
+
+/* detect.c */
+/* Contacts at q with gap <= margin, ordered by shape pair, into sub.contacts. */
+carom_status crm_detect(carom_world *w, const double *q, double margin);
+/* The same with every contact point that velocities like v could close within h, speculative. */
+carom_status crm_detect_ahead(carom_world *w, const double *q, const double *v, double h,
+                              double margin);
+/* Shape pairs whose boxes, grown by margin and swept from q0 to q1, overlap. */
+carom_status crm_candidates(carom_world *w, const double *q0, const double *q1, double margin,
+                            int *n_pairs, const carom_pair **pairs);
+/* Filters, joints and types: whether the shapes of a pair collide at all. */
+int crm_may_collide(const carom_world *w, carom_pair pair);
+carom_manifold crm_collide(const carom_world *w, carom_pair pair, const double *q, double margin);
+/* Signed distance of the pair at q0 + at (q1 - q0). */
+double crm_distance_between(const carom_world *w, carom_pair pair, const double *q0,
+                            const double *q1, double at);
+crm_contact crm_contact_of(const carom_world *w, carom_pair pair, const carom_manifold *m, int k);
+/* Geometry of the contact's recipe at q. */
+void crm_contact_refresh(const carom_world *w, const double *q, crm_contact *c);
+int crm_recipe_same(carom_recipe a, carom_recipe b);
+void crm_sort_joined(carom_world *w);
+
+/* rows.c */
+double crm_combine(int rule, double a, double b);
+/* d combine / da. */
+double crm_combine_slope(int rule, double a, double b);
+/* J_n v of a contact row, v in world order. */
+double crm_row_dot(const double row[6], const double *v, int body_a, int body_b);
+/* Rows of J_n and J_t, equations.md (2), world bodies as columns. */
+void crm_contact_rows(const crm_contact *c, double jn[6], double jt[6]);
+/* Rows of J_e (2 x 6), equations.md (1), and the position error [m]. */
+void crm_joint_rows(const crm_joint *j, const double *q, double je[12], double error[2]);
+/* Problem of the velocity update: u = v0 + h (W f + g), rows of sub.contacts at q0. */
+carom_contact_problem crm_velocity_problem(carom_world *w, crm_substep *s);
+/* Problem of a position correction at q, contacts refreshed there; *violation [m] is the largest
+ * overlap or joint error. */
+carom_contact_problem crm_position_problem(carom_world *w, crm_substep *s, const double *q,
+                                           double *violation);
+/* Largest joint error at q [m]. */
+double crm_joint_drift(const carom_world *w, const double *q);
+
+/* substep.c: memory of sub-steps and rows; contacts found so far are kept when it grows. */
+carom_status crm_substep_create(carom_world *w, crm_substep *s);
+carom_status crm_substep_reserve(carom_world *w, crm_substep *s, int n_contacts);
+void crm_substep_free(carom_world *w, crm_substep *s);
+carom_status crm_rows_create(carom_world *w);
+carom_status crm_rows_reserve(carom_world *w, int n_contacts);
+void crm_rows_free(carom_world *w);
+
+/* euler.c: the map S(h) from (q0, v0) of w->sub to (q1, v1). */
+carom_status crm_euler(carom_world *w, double h);
+/* Rounding error of a position difference, from the farthest body [m]. */
+double crm_rounding(const carom_world *w);
+/* Modes of sub.contacts from the last accepted sub-step. */
+void crm_guess_load(carom_world *w);
+carom_status crm_guess_save(carom_world *w);
+/* Corrects sub.q1 until no contact of sub overlaps and no joint drifts. */
+carom_status crm_project(carom_world *w, crm_substep *s);
+
+/* locate.c: runs S on (0, left]; when a contact outside sub.contacts closes on the way, ends at the
+ * first such event. */
+carom_status crm_locate(carom_world *w, double left);
+
+/* seal.c */
+carom_status crm_seal(carom_world *w);
+void crm_free_sealed(carom_world *w);
+#endif

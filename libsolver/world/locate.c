@@ -1,0 +1,280 @@
+/* locate.c: the time at which a watched pair of shapes closes within a sub-step.
+ * docs/step.md, section "Impacts are located". */
+#include "world/internal.h"
+
+#include <math.h>
+
+/* The root of a gap is found to this [L]; rounding of far coordinates is added. */
+static const double ROOT_TOL = 1e-13;
+/* A pair that closes at the very end of the sub-step: gap up to this [L]. */
+static const double HIT_TOL = 1e-12;
+/* Illinois steps for one root, rounds over several roots, halvings of a failed sub-step. */
+enum { MAX_ROOT_STEPS = 60, MAX_ROUNDS = 20, MAX_HALVINGS = 4, MAX_SAMPLES = 64 };
+
+/* A gap that was positive at q0 and is watched: of a whole pair (its signed distance), or of one
+ * feature of a pair that touches elsewhere. */
+typedef struct watch {
+    carom_pair pair;
+    int by_recipe;
+    carom_recipe recipe;
+    double g0;   /* at q0, > 0 */
+    double g1;   /* at q1 */
+    double at;   /* fraction of the sub-step where g1 was found: 1, or less after a tunnel */
+    int touches; /* 1: closes exactly at the end rather than overlaps */
+} watch;
+
+static double watch_gap(const carom_world *w, const watch *x, const double *q)
+{
+    if (!x->by_recipe) return crm_collide(w, x->pair, q, HUGE_VAL).distance;
+    crm_contact c = {0};
+    c.shape_a = x->pair.a;
+    c.shape_b = x->pair.b;
+    c.body_a = w->shapes[x->pair.a].body;
+    c.body_b = w->shapes[x->pair.b].body;
+    c.recipe = x->recipe;
+    crm_contact_refresh(w, q, &c);
+    return c.gap;
+}
+
+/* Of two watched gaps the one whose straight line meets zero first. */
+static int earlier(const watch *x, const watch *best)
+{
+    if (x->touches != best->touches) return best->touches;
+    const double tx = x->at * x->g0 / (x->g0 - x->g1);
+    const double tb = best->at * best->g0 / (best->g0 - best->g1);
+    return tx < tb;
+}
+
+typedef struct search {
+    carom_world *w;
+    double tol; /* overlap that counts [m] */
+    double hit; /* gap that touches [m] */
+    int any;
+    watch best;
+} search;
+
+static void consider(search *f, const watch *x)
+{
+    if (!(x->g0 > 0) || x->g1 > f->hit) return;
+    watch y = *x;
+    y.touches = x->g1 >= -f->tol;
+    if (!f->any || earlier(&y, &f->best)) f->best = y;
+    f->any = 1;
+}
+
+/* First contact of sub with this pair, or -1; contacts and pairs run in the same order. */
+static int held(const crm_substep *s, carom_pair pair, int *cursor)
+{
+    while (*cursor < s->n_contacts &&
+           (s->contacts[*cursor].shape_a < pair.a ||
+            (s->contacts[*cursor].shape_a == pair.a && s->contacts[*cursor].shape_b < pair.b))) {
+        (*cursor)++;
+    }
+    const int k = *cursor;
+    if (k >= s->n_contacts) return -1;
+    return s->contacts[k].shape_a == pair.a && s->contacts[k].shape_b == pair.b ? k : -1;
+}
+
+static int held_recipe(const crm_substep *s, int k, carom_pair pair, carom_recipe r)
+{
+    for (;
+         k < s->n_contacts && s->contacts[k].shape_a == pair.a && s->contacts[k].shape_b == pair.b;
+         k++) {
+        if (crm_recipe_same(s->contacts[k].recipe, r)) return 1;
+    }
+    return 0;
+}
+
+/* New features of a pair that already touches: another corner comes down. */
+static void consider_features(search *f, carom_pair pair, int k)
+{
+    const crm_substep *s = &f->w->sub;
+    const carom_manifold m = crm_collide(f->w, pair, s->q1, f->hit);
+    for (int i = 0; i < m.count; i++) {
+        if (held_recipe(s, k, pair, m.points[i].recipe)) continue;
+        watch x = {pair, 1, m.points[i].recipe, 0, m.points[i].gap, 1, 0};
+        x.g0 = watch_gap(f->w, &x, s->q0);
+        if (x.g0 > f->w->settings.margin * f->w->length) consider(f, &x);
+    }
+}
+
+/* How many poses between q0 and q1 must be looked at so that no pair passes through unseen. */
+static int samples(const carom_world *w, carom_pair pair)
+{
+    const crm_substep *s = &w->sub;
+    const crm_shape *a = &w->shapes[pair.a];
+    const crm_shape *b = &w->shapes[pair.b];
+    double d[3];
+    for (int k = 0; k < 3; k++) {
+        d[k] = (s->q1[3 * b->body + k] - s->q0[3 * b->body + k]) -
+               (s->q1[3 * a->body + k] - s->q0[3 * a->body + k]);
+    }
+    const double turn_a = s->q1[3 * a->body] - s->q0[3 * a->body];
+    const double turn_b = s->q1[3 * b->body] - s->q0[3 * b->body];
+    const double travel = hypot(d[1], d[2]) + fabs(turn_a) * a->reach + fabs(turn_b) * b->reach;
+    const double n = ceil(2 * travel / (a->thickness + b->thickness));
+    return n < MAX_SAMPLES ? (int)n : MAX_SAMPLES;
+}
+
+static void consider_pair(search *f, carom_pair pair)
+{
+    const crm_substep *s = &f->w->sub;
+    watch x = {pair, 0, {0}, 0, 0, 1, 0};
+    const int n = samples(f->w, pair);
+    for (int i = 1; i < n; i++) {
+        const double at = (double)i / n;
+        x.g1 = crm_distance_between(f->w, pair, s->q0, s->q1, at);
+        if (x.g1 >= -f->tol) continue;
+        x.at = at;
+        x.g0 = watch_gap(f->w, &x, s->q0);
+        consider(f, &x);
+        return;
+    }
+    const carom_manifold m = crm_collide(f->w, pair, s->q1, f->hit);
+    if (!m.count) return;
+    x.g1 = m.distance;
+    x.g0 = watch_gap(f->w, &x, s->q0);
+    consider(f, &x);
+}
+
+/* The earliest watched gap that has closed at q1, into *found; 0 when there is none. */
+static carom_status first_closed(carom_world *w, watch *found, int *any)
+{
+    const double noise = crm_rounding(w);
+    search f = {w,
+                w->settings.penetration * w->length + noise,
+                HIT_TOL * w->length + noise,
+                0,
+                {{0, 0}, 0, {0}, 0, 0, 1, 0}};
+    int n;
+    int cursor = 0;
+    const carom_pair *pairs;
+    const crm_substep *s = &w->sub;
+    const carom_status e = crm_candidates(w, s->q0, s->q1, f.hit, &n, &pairs);
+    if (e < 0) return e;
+    w->stats->n_candidates = n;
+    for (int k = 0; k < n; k++) {
+        if (!crm_may_collide(w, pairs[k])) continue;
+        const int c = held(s, pairs[k], &cursor);
+        if (c >= 0) {
+            consider_features(&f, pairs[k], c);
+        } else {
+            consider_pair(&f, pairs[k]);
+        }
+    }
+    *any = f.any;
+    *found = f.best;
+    return CAROM_OK;
+}
+
+/* h in (0, *h] with gap(q1(h)) = 0: Illinois, then bisection.  Leaves sub evaluated at *h. */
+static carom_status find_root(carom_world *w, const watch *x, double *h)
+{
+    const double tol = ROOT_TOL * w->length + crm_rounding(w);
+    double a = 0;
+    double b = *h;
+    double ga = x->g0;
+    double gb = x->g1;
+    int side = 0;
+    for (int i = 0; i < MAX_ROOT_STEPS; i++) {
+        const double t = i < MAX_ROOT_STEPS / 2 ? (a * gb - b * ga) / (gb - ga) : 0.5 * (a + b);
+        const carom_status e = crm_euler(w, t);
+        if (e < 0) return e;
+        *h = t;
+        const double g = watch_gap(w, x, w->sub.q1);
+        if (fabs(g) <= tol || b - a <= 1e-16 * b) return CAROM_OK;
+        if (g > 0) {
+            a = t;
+            ga = g;
+            if (side == 1) gb *= 0.5;
+            side = 1;
+        } else {
+            b = t;
+            gb = g;
+            if (side == -1) ga *= 0.5;
+            side = -1;
+        }
+    }
+    return CAROM_OK;
+}
+
+/* The contact point that closes, for the derivative of the event time. */
+static int set_event(carom_world *w, const watch *x)
+{
+    crm_substep *s = &w->sub;
+    const double near = HIT_TOL * w->length + 4 * crm_rounding(w);
+    const carom_manifold m = crm_collide(w, x->pair, s->q1, x->by_recipe ? HUGE_VAL : near);
+    int best = -1;
+    for (int k = 0; k < m.count; k++) {
+        if (x->by_recipe && !crm_recipe_same(m.points[k].recipe, x->recipe)) continue;
+        if (best < 0 || m.points[k].gap < m.points[best].gap) best = k;
+    }
+    if (best < 0) return 0;
+    s->event = crm_contact_of(w, x->pair, &m, best);
+    s->end = CRM_END_EVENT;
+    return 1;
+}
+
+/* Same gap: the one whose root was just found. */
+static int same_watch(const watch *x, const watch *y)
+{
+    return x->pair.a == y->pair.a && x->pair.b == y->pair.b && x->by_recipe == y->by_recipe &&
+           (!x->by_recipe || crm_recipe_same(x->recipe, y->recipe));
+}
+
+/* From a closed gap at h to the earliest event.  With no root that can be named the sub-step ends
+ * at a constant fraction of the time left. */
+static carom_status go_to_event(carom_world *w, watch x, double left)
+{
+    crm_substep *s = &w->sub;
+    double h = left * x.at;
+    for (int round = 0; round < MAX_ROUNDS; round++) {
+        watch next;
+        int any;
+        carom_status e = find_root(w, &x, &h);
+        if (!e) e = first_closed(w, &next, &any);
+        if (e < 0) return e;
+        if (!any || next.touches || same_watch(&x, &next)) break;
+        x = next;
+        h *= next.at;
+    }
+    if (!set_event(w, &x)) {
+        s->end = CRM_END_FRACTION;
+        s->fraction = h / left;
+    }
+    return CAROM_OK;
+}
+
+/* A sub-step without a solution is tried at half its length, four levels deep. */
+static carom_status halve(carom_world *w, double left, carom_status failed)
+{
+    crm_substep *s = &w->sub;
+    s->fraction = 1;
+    for (int k = 0; k < MAX_HALVINGS; k++) {
+        s->fraction *= 0.5;
+        const carom_status e = crm_euler(w, s->fraction * left);
+        s->end = CRM_END_FRACTION;
+        if (e >= 0) return e;
+    }
+    return failed;
+}
+
+carom_status crm_locate(carom_world *w, double left)
+{
+    crm_substep *s = &w->sub;
+    s->end = CRM_END_FRAME;
+    carom_status e = crm_euler(w, left);
+    if (e == CAROM_E_NO_SOLUTION || e == CAROM_E_INFEASIBLE) return halve(w, left, e);
+    if (e < 0) return e;
+    watch x;
+    int any;
+    e = first_closed(w, &x, &any);
+    if (e < 0 || !any) return e;
+    if (x.touches) {
+        set_event(w, &x);
+        return CAROM_OK;
+    }
+    e = go_to_event(w, x, left);
+    if (e == CAROM_E_NO_SOLUTION || e == CAROM_E_INFEASIBLE) return halve(w, left, e);
+    return e;
+}

@@ -1,0 +1,218 @@
+/* world.c: life and state of a world. */
+#include "world/internal.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+carom_status crm_world_fail(carom_world *w, carom_status status, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    vsnprintf(w->error, sizeof w->error, format, args);
+    va_end(args);
+    return status;
+}
+
+static carom_status check_settings(const carom_world_settings *s)
+{
+    const int positive = s->dt > 0 && s->margin > 0 && s->penetration > 0 && s->accept > 0 &&
+                         s->inexact >= s->accept && s->length >= 0 && s->rest_speed >= 0;
+    const int bounded = s->dt < HUGE_VAL && s->margin < 1 && s->penetration < 1 &&
+                        s->length < HUGE_VAL && s->rest_speed < HUGE_VAL;
+    const int finite = isfinite(s->gravity[0]) && isfinite(s->gravity[1]);
+    const int words = s->integrator == CAROM_EULER && s->combine_friction >= 0 &&
+                      s->combine_friction <= CAROM_COMBINE_MAX && s->combine_restitution >= 0 &&
+                      s->combine_restitution <= CAROM_COMBINE_MAX;
+    return positive && bounded && finite && words && s->max_substeps >= 1 ? CAROM_OK
+                                                                          : CAROM_E_ARGUMENT;
+}
+
+carom_status carom_world_create(const carom_world_settings *settings,
+                                const carom_allocator *allocator, carom_world **out)
+{
+    if (!out) return CAROM_E_ARGUMENT;
+    *out = NULL;
+    const carom_world_settings chosen = settings ? *settings : carom_world_defaults();
+    if (check_settings(&chosen)) return CAROM_E_ARGUMENT;
+    crm_memory memory = crm_memory_from(allocator);
+    carom_world *w = crm_new(&memory, 1, sizeof *w);
+    if (!w) return CAROM_E_MEMORY;
+    w->memory = memory;
+    w->settings = chosen;
+    carom_contact_settings c = carom_contact_defaults();
+    c.accept = chosen.accept;
+    c.inexact = chosen.inexact;
+    carom_status e = carom_contact_create(&c, allocator, &w->solver);
+    if (!e) e = carom_broadphase_create(allocator, &w->broadphase);
+    if (!e) e = crm_reserve_bodies(w);
+    if (e) {
+        carom_world_destroy(w);
+        return e;
+    }
+    *out = w;
+    return CAROM_OK;
+}
+
+static void free_built(carom_world *w)
+{
+    crm_memory *m = &w->memory;
+    crm_free(m, w->bodies, (size_t)w->max_bodies, sizeof *w->bodies);
+    crm_free(m, w->body_block, w->body_bytes, 1);
+    crm_free(m, w->shapes, (size_t)w->max_shapes, sizeof *w->shapes);
+    crm_free(m, w->vertices, (size_t)w->max_vertices, sizeof *w->vertices);
+    crm_free(m, w->joints, (size_t)w->max_joints, sizeof *w->joints);
+}
+
+void crm_free_sealed(carom_world *w)
+{
+    crm_free(&w->memory, w->seal_block, w->seal_bytes, 1);
+    w->seal_block = NULL;
+    crm_rows_free(w);
+    crm_substep_free(w, &w->sub);
+}
+
+void carom_world_destroy(carom_world *world)
+{
+    if (!world) return;
+    carom_contact_destroy(world->solver);
+    carom_broadphase_destroy(world->broadphase);
+    crm_free_sealed(world);
+    free_built(world);
+    crm_free(&world->memory, world->guess, (size_t)world->max_guess, sizeof *world->guess);
+    crm_memory m = world->memory;
+    crm_free(&m, world, 1, sizeof *world);
+}
+
+const char *carom_world_error(const carom_world *world)
+{
+    return world ? world->error : "";
+}
+
+int carom_world_n_bodies(const carom_world *world)
+{
+    return world->n_bodies;
+}
+
+int carom_world_n_joints(const carom_world *world)
+{
+    return world->n_joints;
+}
+
+long carom_world_steps(const carom_world *world)
+{
+    return world->n_steps;
+}
+
+double carom_world_time(const carom_world *world)
+{
+    return (double)world->n_steps * world->settings.dt;
+}
+
+const double *carom_world_q(const carom_world *world)
+{
+    return world->q;
+}
+
+const double *carom_world_v(const carom_world *world)
+{
+    return world->v;
+}
+
+carom_world_settings carom_world_get_settings(const carom_world *world)
+{
+    return world->settings;
+}
+
+static int all_finite(int n, const double *x)
+{
+    for (int k = 0; k < n; k++) {
+        if (!isfinite(x[k])) return 0;
+    }
+    return 1;
+}
+
+carom_status carom_world_set_state(carom_world *world, const double *q, const double *v)
+{
+    if (!world) return CAROM_E_ARGUMENT;
+    carom_world *w = world;
+    const int n = 3 * w->n_bodies;
+    if ((q && !all_finite(n, q)) || (v && !all_finite(n, v))) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "a state is not finite");
+    }
+    for (int b = 0; v && b < w->n_bodies; b++) {
+        const double *vb = v + 3 * b;
+        if (w->bodies[b].type == CAROM_STATIC && (vb[0] != 0 || vb[1] != 0 || vb[2] != 0)) {
+            return crm_world_fail(w, CAROM_E_ARGUMENT, "static body %d cannot have a velocity", b);
+        }
+    }
+    if (q) memmove(w->q, q, (size_t)n * sizeof *q);
+    if (v) memmove(w->v, v, (size_t)n * sizeof *v);
+    w->n_guess = 0;
+    w->carry = 0;
+    return CAROM_OK;
+}
+
+double carom_world_energy(const carom_world *world)
+{
+    const carom_world *w = world;
+    double energy = 0;
+    for (int b = 0; b < w->n_bodies; b++) {
+        if (w->bodies[b].type != CAROM_DYNAMIC) continue;
+        const double *q = w->q + 3 * b;
+        const double *v = w->v + 3 * b;
+        energy += 0.5 * (w->inertia[b] * v[0] * v[0] + w->mass[b] * (v[1] * v[1] + v[2] * v[2])) -
+                  w->mass[b] * (w->settings.gravity[0] * q[1] + w->settings.gravity[1] * q[2]);
+    }
+    return energy;
+}
+
+int carom_world_n_contacts(const carom_world *world)
+{
+    return world->sub.n_contacts;
+}
+
+carom_contact_info carom_world_contact(const carom_world *world, int k)
+{
+    const crm_substep *s = &world->sub;
+    const crm_contact *c = &s->contacts[k];
+    carom_contact_info i;
+    i.body_a = c->body_a;
+    i.body_b = c->body_b;
+    i.point.x = s->q0[3 * c->body_a + 1] + c->arm_a.x;
+    i.point.y = s->q0[3 * c->body_a + 2] + c->arm_a.y;
+    i.normal = c->normal;
+    i.gap = c->gap;
+    i.ln = s->ln[k];
+    i.lt = s->lt[k];
+    i.mode = (carom_contact_mode)s->mode[k];
+    return i;
+}
+
+carom_world_size carom_world_measure(const carom_world *world)
+{
+    const carom_world *w = world;
+    carom_world_size z = {0};
+    size_t solver_bytes;
+    long calls;
+    for (int b = 0; b < w->n_bodies; b++) {
+        z.n_dynamic += w->bodies[b].type == CAROM_DYNAMIC;
+        z.n_static += w->bodies[b].type == CAROM_STATIC;
+        z.n_kinematic += w->bodies[b].type == CAROM_KINEMATIC;
+    }
+    z.n_shapes = w->n_shapes;
+    z.n_vertices = w->n_vertices;
+    z.n_joints = w->n_joints;
+    z.n_unknowns = 3 * (z.n_dynamic + z.n_kinematic);
+    z.n_joint_rows = 2 * w->n_joints;
+    z.n_contacts = w->sub.n_contacts;
+    for (int k = 0; k < w->sub.n_contacts; k++) {
+        const crm_contact *c = &w->sub.contacts[k];
+        z.n_friction += crm_combine(w->settings.combine_friction, w->friction[c->body_a],
+                                    w->friction[c->body_b]) > 0;
+    }
+    carom_contact_memory(w->solver, &solver_bytes, &calls);
+    z.bytes = w->memory.live + solver_bytes;
+    z.bytes_high = w->memory.high + solver_bytes;
+    return z;
+}
