@@ -1,0 +1,48 @@
+#!/bin/sh
+# check-docs.sh: the programs in README.md are the files they name, links lead somewhere, and the
+# equations that the code cites exist.
+set -eu
+cd -- "$(dirname -- "$0")/.."
+errors=0
+error() {
+    echo "$*"
+    errors=$((errors + 1))
+}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# The first fenced block after a line that names the file.
+block_after() {
+    awk -v name="$1" '
+        inside && /^```/ { exit }
+        inside { print }
+        seen && /^```/ { inside = 1 }
+        index($0, name) { seen = 1 }' README.md
+}
+
+for example in clients/examples/embed.c clients/examples/client.py; do
+    block_after "$example" >"$work/block"
+    [ -s "$work/block" ] || error "README.md does not show $example"
+    diff "$example" "$work/block" || error "README.md shows another $example"
+done
+
+for page in $(find . -name '*.md' -not -path './build*' -not -path './out/*' | sort); do
+    grep -oE '\]\([^)]+\)' "$page" | sed 's/^](//; s/)$//; s/#.*//' >"$work/links" || true
+    while IFS= read -r link; do
+        case $link in
+        '' | *://*) ;;
+        *) [ -e "${page%/*}/$link" ] || error "$page: there is no $link" ;;
+        esac
+    done <"$work/links"
+done
+
+grep -rhoE --include='*.[ch]' --include='*.py' '(equations\.md|EQUATIONS) \([0-9]+\)' \
+    libgeom libsolver proto daemon clients tests | sed 's/.*(//; s/)//' | sort -nu >"$work/cited"
+while IFS= read -r number; do
+    grep -q "^($number) " docs/math/equations.md ||
+        error "equation ($number) is cited, but docs/math/equations.md has none"
+done <"$work/cited"
+[ -s "$work/cited" ] || error "no citation of an equation found: this script looks in the wrong place"
+
+echo "$(wc -l <"$work/cited") equations cited, $errors errors"
+[ $errors -eq 0 ]
