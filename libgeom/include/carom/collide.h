@@ -13,20 +13,21 @@ extern "C" {
 #endif
 
 typedef enum carom_kernel {
-    CAROM_POINT_POINT,  /* EQUATIONS (41): vertex `ref` of A, vertex `inc` of B */
-    CAROM_EDGE_VERTEX,  /* (42): edge `ref` of the reference shape, vertex `inc` of the other */
-    CAROM_EDGE_CLIPPED  /* (42) after (43): edge `inc` of the other shape, clipped at an end of `ref` */
+    CAROM_POINT_POINT, /* EQUATIONS (41): vertex `ref` of A, vertex `inc` of B */
+    CAROM_EDGE_VERTEX, /* (42): edge `ref` of the reference shape, vertex `inc` of the other */
+    CAROM_EDGE_CLIPPED /* (42) after (43): edge `inc` of the other shape, clipped at an end of `ref`
+                        */
 } carom_kernel;
 
 /* How a contact point is computed: all that its derivative needs.  Edge k runs from vertex k to
- * k + 1 (cyclic).  Also the point's stable identity across steps. */
+ * k + 1 (cyclic); its normal is on the right.  A capsule has two edges, 0 and 1, back to back.
+ * Also the point's stable identity across steps. */
 typedef struct carom_recipe {
     int ref;
     int inc;
     unsigned char kernel;  /* carom_kernel */
     unsigned char flipped; /* 1: the reference edge belongs to B */
     unsigned char at_end;  /* clipped: 0 at the start of the reference edge, 1 at its end */
-    unsigned char side;    /* two-vertex reference shapes: 1 when the edge is used from its far side */
 } carom_recipe;
 
 typedef struct carom_contact_point {
@@ -38,17 +39,27 @@ typedef struct carom_contact_point {
 
 typedef struct carom_manifold {
     carom_vec2 normal; /* unit, from A to B; common to all points */
-    double distance;   /* signed distance of the shapes [m]; a lower bound > margin when count = 0 */
-    int count;         /* 0, 1 or 2 */
-    int ambiguous;     /* 1: another reference face is as good within rounding, or centers coincide */
+    double distance; /* signed distance of the shapes [m]; a lower bound > margin when count = 0 */
+    int count;       /* 0, 1 or 2 */
+    int ambiguous;   /* 1: another reference face is as good within rounding, or centers coincide */
     carom_contact_point points[2]; /* with gap <= margin */
 } carom_manifold;
 
-/* Contact manifold of two valid shapes.  margin [m] >= 0, or HUGE_VAL for points at any gap. */
+/* Contact manifold of two valid shapes.  margin [m] >= 0, or HUGE_VAL for points at any gap.
+ *
+ * Let the cores be the shapes without their radii.  Apart, closest at two vertices: one point, the
+ * normal along the line between them.  Otherwise the reference is the closest face (overlapping:
+ * the face of largest separation; ties go to A, then to the lowest index), the normal is its
+ * normal, and the points are the ends of the other shape's opposite edge, clipped at the planes
+ * through the ends of the reference edge.  distance = signed distance of the cores - both radii.
+ * Concentric circles have the normal (1, 0) and are ambiguous. */
 CAROM_API carom_manifold carom_collide(const carom_shape *a, carom_pose pose_a,
                                        const carom_shape *b, carom_pose pose_b, double margin);
 
-/* The point and normal that a recipe gives at these poses (no search). */
+/* The point and normal that a recipe gives at these poses (no search).  recipe: from carom_collide
+ * on shapes with the same numbers of vertices.  Where the formula has no value (two vertices at one
+ * place, an incident edge square to the reference edge) the normal is (1, 0), or the clipped point
+ * the start of its edge, and derivatives hold that fixed. */
 CAROM_API carom_contact_point carom_contact_eval(const carom_shape *a, carom_pose pose_a,
                                                  const carom_shape *b, carom_pose pose_b,
                                                  carom_recipe recipe, carom_vec2 *normal);

@@ -28,9 +28,11 @@ typedef enum carom_shape_fault {
     CAROM_SHAPE_DUPLICATE,  /* a vertex equals the next one within 1e-12 of the extent */
     CAROM_SHAPE_CLOCKWISE,  /* reverse the order */
     CAROM_SHAPE_REFLEX,     /* the interior angle at a vertex exceeds 180 degrees */
-    CAROM_SHAPE_COLLINEAR,  /* a vertex lies on the line of its neighbors within 1e-12 of the extent */
-    CAROM_SHAPE_CROSSING,   /* the outline winds more than once around */
-    CAROM_SHAPE_AREA        /* area below 1e-12 of the squared extent */
+    CAROM_SHAPE_COLLINEAR,  /* a vertex lies on the line of its neighbors within 1e-12 of the extent
+                             */
+    CAROM_SHAPE_CROSSING,   /* the outline crosses itself, or winds around more than once */
+    CAROM_SHAPE_AREA,       /* area below 1e-12 of the squared extent */
+    CAROM_SHAPE_SIZE        /* a length outside 1e-100 .. 1e100 m: its square could overflow */
 } carom_shape_fault;
 
 typedef struct carom_shape_error {
@@ -38,14 +40,16 @@ typedef struct carom_shape_error {
     int vertex; /* index of the offending vertex, -1: the shape as a whole */
 } carom_shape_error;
 
-/* CAROM_OK, or CAROM_E_SHAPE with *error filled (may be NULL).  Nothing is repaired. */
+/* CAROM_OK, or CAROM_E_SHAPE with *error filled (may be NULL).  Nothing is repaired.  The extent is
+ * the larger side of the box around the vertices.  Orientation is judged by the whole outline. */
 CAROM_API carom_status carom_shape_check(const carom_shape *shape, carom_shape_error *error);
-/* Writes one sentence ("vertex 3: clockwise; reverse the order"), always terminated. */
+/* Writes one sentence with the remedy, as "vertex 3: equal to the next vertex; remove one of the
+ * two", cut to size and always terminated. */
 CAROM_API void carom_shape_error_text(carom_shape_error error, char *text, size_t size);
 
 typedef struct carom_mass_properties {
-    double area;         /* [m^2] */
-    carom_vec2 centroid; /* body frame [m] */
+    double area;         /* [m^2]; 0 for a segment without radius */
+    carom_vec2 centroid; /* body frame [m]; of a segment without radius its middle */
     double mass;         /* density * area [kg] */
     double inertia;      /* about the centroid [kg m^2] */
 } carom_mass_properties;

@@ -1,0 +1,58 @@
+/* closest.h: signed distance of the cores (shapes without their radii) and the features that give
+ * it.  The core of a circle is its center, of a capsule a segment with two edges back to back. */
+#ifndef CRM_CLOSEST_H
+#define CRM_CLOSEST_H
+
+#include "collide/placed.h"
+
+typedef enum crm_closest_kind {
+    CRM_VERTICES, /* vertex `a` of A, vertex `b` of B */
+    CRM_FACE_A,   /* edge `a` of A, vertex `b` of B */
+    CRM_FACE_B,   /* vertex `a` of A, edge `b` of B */
+    CRM_APART     /* farther than the reach; `gap` is a lower bound */
+} crm_closest_kind;
+
+typedef struct crm_closest {
+    crm_closest_kind kind;
+    int a;
+    int b;
+    int tied;   /* another face is as good within rounding */
+    double gap; /* signed distance of the cores [m] */
+} crm_closest;
+
+/* Height of vertex j of q over the line of edge k of p, along the edge's unit outward normal. */
+double crm_height(const crm_placed *p, int k, const crm_placed *q, int j);
+
+/* The parts, in closest.c, walk.c, sweep.c and gjk.c. --------------------------------------- */
+
+/* A direction d with its support vertices: certified when d . (b - a) > 0, for then the line across
+ * d separates the cores. */
+typedef struct crm_axis {
+    carom_vec2 d;
+    int a;
+    int b;
+} crm_axis;
+
+/* From a certified axis to the closest features (docs/math/equations.md, end of section 5).
+ * 0: not found, the certificate was rounding. */
+int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closest *out);
+
+/* The face of largest separation, O(n_a + n_b); the distance when the cores overlap.  Faces within
+ * 1e-14 of the pair's extent are tied: the first wins, A's before B's.  Stops at CRM_APART as soon
+ * as a face separates by more than reach.  Not both may be points. */
+crm_closest crm_sweep(const crm_placed *a, const crm_placed *b, double reach);
+
+/* libccd's GJK.  1: it says disjoint and *axis is its last direction with our support vertices, yet
+ * to be certified by the caller. */
+int crm_gjk(const crm_placed *a, const crm_placed *b, carom_vec2 first, crm_axis *axis);
+
+/* ------------------------------------------------------------------------------------------- */
+
+/* Pairs with fewer vertices skip GJK.  A setting of speed: the answer does not depend on it. */
+enum { CRM_GJK_MIN_VERTICES = 24 };
+
+/* reach [m]: give up (CRM_APART) when farther; HUGE_VAL: never.  Not both may be points. */
+crm_closest crm_closest_features(const crm_placed *a, const crm_placed *b, double reach,
+                                 int gjk_min_vertices);
+
+#endif

@@ -1,0 +1,231 @@
+/* kernels.c: the three contact kernels and their reverse derivatives.
+ *
+ * In terms of the arms (vertices relative to their own body) and D = position of the second shape -
+ * position of the first.  docs/math/equations.md (40)-(43), with a radius on either side:
+ *
+ *   point-point   u = D + b - a, l = |u|, n = u / l;  gap = l - ra - rb
+ *                 arm_a = a + ra n,  arm_b = b - rb n
+ *   edge-point    e the edge from arm a, m its unit normal, x = D + q - a, h = m . x;
+ *                 gap = h - rp - rq;  arm_p = q + D - (h - rp) m,  arm_q = q - rq m
+ *   clipped       N = e . (c - i - D), w the incident edge from arm i, tau = N / (e . w);
+ *                 then edge-point with q = i + tau w */
+#include "collide/kernels.h"
+
+#include <assert.h>
+
+typedef struct point_point {
+    carom_vec2 n;
+    double l;
+} point_point;
+
+static point_point point_point_at(carom_vec2 u)
+{
+    const double l = crm_length(u);
+    const point_point k = {l > 0 ? crm_scale(1.0 / l, u) : crm_vec(1, 0), l};
+    return k;
+}
+
+/* Reference shape p, incident shape q. */
+typedef struct edge_point {
+    const crm_placed *p;
+    const crm_placed *q;
+    carom_vec2 d;   /* position of q - position of p */
+    carom_vec2 e;   /* reference edge */
+    carom_vec2 t;   /* unit tangent */
+    carom_vec2 m;   /* unit normal */
+    carom_vec2 arm; /* the incident point, relative to q's body */
+    carom_vec2 x;   /* from the start of the edge to the incident point */
+    double length;
+    double h;
+    /* clipped only */
+    carom_vec2 w;   /* incident edge */
+    carom_vec2 cut; /* c - i - D */
+    double tau;
+    double slope; /* e . w */
+} edge_point;
+
+static carom_vec2 clip(edge_point *k, carom_recipe r)
+{
+    const int end = r.at_end ? crm_next(k->p, r.ref) : r.ref;
+    const carom_vec2 i = crm_arm(k->q, r.inc);
+    k->w = crm_edge(k->q, r.inc);
+    k->cut = crm_sub(crm_sub(crm_arm(k->p, end), i), k->d);
+    k->slope = crm_dot(k->e, k->w);
+    k->tau = k->slope != 0 ? crm_dot(k->e, k->cut) / k->slope : 0.0;
+    return crm_add_scaled(i, k->tau, k->w);
+}
+
+static edge_point edge_point_at(const crm_placed *p, const crm_placed *q, carom_recipe r)
+{
+    edge_point k = {0};
+    k.p = p;
+    k.q = q;
+    k.d = crm_sub(q->at, p->at);
+    k.e = crm_edge(p, r.ref);
+    k.length = crm_length(k.e);
+    k.t = crm_scale(1.0 / k.length, k.e);
+    k.m = crm_right(k.t);
+    k.arm = r.kernel == CAROM_EDGE_CLIPPED ? clip(&k, r) : crm_arm(q, r.inc);
+    k.x = crm_add(k.d, crm_sub(k.arm, crm_arm(p, r.ref)));
+    k.h = crm_dot(k.m, k.x);
+    return k;
+}
+
+static carom_contact_point eval_point_point(const crm_placed *a, const crm_placed *b,
+                                            carom_recipe r, carom_vec2 *normal)
+{
+    const point_point k = point_point_at(crm_between(a, r.ref, b, r.inc));
+    carom_contact_point out;
+    *normal = k.n;
+    out.arm_a = crm_add_scaled(crm_arm(a, r.ref), a->radius, k.n);
+    out.arm_b = crm_add_scaled(crm_arm(b, r.inc), -b->radius, k.n);
+    out.gap = k.l - (a->radius + b->radius);
+    out.recipe = r;
+    return out;
+}
+
+carom_contact_point crm_contact_at(const crm_placed *a, const crm_placed *b, carom_recipe r,
+                                   carom_vec2 *normal)
+{
+    assert(r.ref >= 0 && r.ref < (r.flipped ? b->n : a->n));
+    assert(r.inc >= 0 && r.inc < (r.flipped ? a->n : b->n));
+    if (r.kernel == CAROM_POINT_POINT) return eval_point_point(a, b, r, normal);
+    const edge_point k = r.flipped ? edge_point_at(b, a, r) : edge_point_at(a, b, r);
+    const carom_vec2 arm_p = crm_add_scaled(crm_add(k.arm, k.d), k.p->radius - k.h, k.m);
+    const carom_vec2 arm_q = crm_add_scaled(k.arm, -k.q->radius, k.m);
+    carom_contact_point out;
+    *normal = r.flipped ? crm_neg(k.m) : k.m;
+    out.arm_a = r.flipped ? arm_q : arm_p;
+    out.arm_b = r.flipped ? arm_p : arm_q;
+    out.gap = k.h - (a->radius + b->radius);
+    out.recipe = r;
+    return out;
+}
+
+/* x = R v for a vertex or an edge: adds x_bar to the cotangents of the angle and of v. */
+static void turn_vjp(const crm_placed *p, carom_vec2 x, carom_vec2 x_bar, double *angle_bar,
+                     carom_vec2 *v_bar)
+{
+    *angle_bar += crm_cross(x, x_bar);
+    if (v_bar) *v_bar = crm_add(*v_bar, crm_turn_back(p, x_bar));
+}
+
+static void arm_vjp(const crm_placed *p, int i, carom_vec2 x_bar, carom_shape_bar *bar)
+{
+    turn_vjp(p, crm_arm(p, i), x_bar, &bar->pose.angle, bar->vertices ? bar->vertices + i : NULL);
+}
+
+static void edge_vjp(const crm_placed *p, int k, carom_vec2 e_bar, carom_shape_bar *bar)
+{
+    turn_vjp(p, crm_edge(p, k), e_bar, &bar->pose.angle,
+             bar->vertices ? bar->vertices + crm_next(p, k) : NULL);
+    if (bar->vertices) {
+        bar->vertices[k] = crm_sub(bar->vertices[k], crm_turn_back(p, e_bar));
+    }
+}
+
+/* D = position of the second - position of the first. */
+static void offset_vjp(carom_vec2 d_bar, carom_shape_bar *first, carom_shape_bar *second)
+{
+    first->pose.x -= d_bar.x;
+    first->pose.y -= d_bar.y;
+    second->pose.x += d_bar.x;
+    second->pose.y += d_bar.y;
+}
+
+/* (41): N = n_bar + ra arm_a_bar - rb arm_b_bar,  u_bar = (N - n (n . N)) / l + gap_bar n. */
+static void point_point_vjp(const crm_placed *a, const crm_placed *b, carom_recipe r,
+                            const carom_contact_bar *g, carom_shape_bar *a_bar,
+                            carom_shape_bar *b_bar)
+{
+    const point_point k = point_point_at(crm_between(a, r.ref, b, r.inc));
+    const carom_vec2 n_bar =
+        crm_add_scaled(crm_add_scaled(g->normal, a->radius, g->arm_a), -b->radius, g->arm_b);
+    carom_vec2 u_bar = crm_scale(g->gap, k.n);
+    if (k.l > 0) {
+        const carom_vec2 across = crm_add_scaled(n_bar, -crm_dot(k.n, n_bar), k.n);
+        u_bar = crm_add_scaled(u_bar, 1.0 / k.l, across);
+    }
+    arm_vjp(a, r.ref, crm_sub(g->arm_a, u_bar), a_bar);
+    arm_vjp(b, r.inc, crm_add(g->arm_b, u_bar), b_bar);
+    offset_vjp(u_bar, a_bar, b_bar);
+    a_bar->radius += crm_dot(k.n, g->arm_a) - g->gap;
+    b_bar->radius -= crm_dot(k.n, g->arm_b) + g->gap;
+}
+
+/* (43) in arms: q_bar is the cotangent of the clipped point.  Returns the edge's share of e_bar. */
+static carom_vec2 clip_vjp(const edge_point *k, carom_recipe r, carom_vec2 q_bar,
+                           carom_shape_bar *p_bar, carom_shape_bar *s_bar)
+{
+    const double tau_bar = k->slope != 0 ? crm_dot(q_bar, k->w) / k->slope : 0.0; /* = N_bar */
+    const double slope_bar = -k->tau * tau_bar;
+    const carom_vec2 cut_bar = crm_scale(tau_bar, k->e);
+    const carom_vec2 w_bar = crm_add_scaled(crm_scale(k->tau, q_bar), slope_bar, k->e);
+    arm_vjp(k->q, r.inc, crm_sub(q_bar, cut_bar), s_bar);
+    edge_vjp(k->q, r.inc, w_bar, s_bar);
+    arm_vjp(k->p, r.at_end ? crm_next(k->p, r.ref) : r.ref, cut_bar, p_bar);
+    offset_vjp(crm_neg(cut_bar), p_bar, s_bar);
+    return crm_add_scaled(crm_scale(tau_bar, k->cut), slope_bar, k->w);
+}
+
+/* (42) with both radii; g is seen from the reference shape: arm_a is on p, arm_b on q.
+ *   h_bar = gap_bar - m . arm_p_bar
+ *   m_bar = n_bar - (h - rp) arm_p_bar - rq arm_q_bar + h_bar x
+ *   e_bar = -m (t . m_bar) / |e| */
+static void edge_point_vjp(const edge_point *k, carom_recipe r, const carom_contact_bar *g,
+                           carom_shape_bar *p_bar, carom_shape_bar *q_bar)
+{
+    const double h_bar = g->gap - crm_dot(k->m, g->arm_a);
+    carom_vec2 m_bar = crm_add_scaled(g->normal, k->p->radius - k->h, g->arm_a);
+    m_bar = crm_add_scaled(m_bar, -k->q->radius, g->arm_b);
+    m_bar = crm_add_scaled(m_bar, h_bar, k->x);
+    carom_vec2 e_bar = crm_scale(-crm_dot(k->t, m_bar) / k->length, k->m);
+    const carom_vec2 d_bar = crm_add_scaled(g->arm_a, h_bar, k->m);
+    const carom_vec2 point_bar = crm_add(d_bar, g->arm_b);
+    if (r.kernel == CAROM_EDGE_CLIPPED) {
+        e_bar = crm_add(e_bar, clip_vjp(k, r, point_bar, p_bar, q_bar));
+    } else {
+        arm_vjp(k->q, r.inc, point_bar, q_bar);
+    }
+    arm_vjp(k->p, r.ref, crm_scale(-h_bar, k->m), p_bar);
+    edge_vjp(k->p, r.ref, e_bar, p_bar);
+    offset_vjp(d_bar, p_bar, q_bar);
+    p_bar->radius += crm_dot(k->m, g->arm_a) - g->gap;
+    q_bar->radius -= crm_dot(k->m, g->arm_b) + g->gap;
+}
+
+static void place_pair(const carom_shape *a, carom_pose pose_a, const carom_shape *b,
+                       carom_pose pose_b, crm_placed *pa, crm_placed *pb)
+{
+    *pa = crm_place(a, pose_a.angle, crm_vec(0, 0));
+    *pb = crm_place(b, pose_b.angle, crm_vec(pose_b.x - pose_a.x, pose_b.y - pose_a.y));
+}
+
+carom_contact_point carom_contact_eval(const carom_shape *a, carom_pose pose_a,
+                                       const carom_shape *b, carom_pose pose_b, carom_recipe recipe,
+                                       carom_vec2 *normal)
+{
+    crm_placed pa;
+    crm_placed pb;
+    place_pair(a, pose_a, b, pose_b, &pa, &pb);
+    return crm_contact_at(&pa, &pb, recipe, normal);
+}
+
+void carom_contact_vjp(const carom_shape *a, carom_pose pose_a, const carom_shape *b,
+                       carom_pose pose_b, carom_recipe recipe, const carom_contact_bar *bar,
+                       carom_shape_bar *a_bar, carom_shape_bar *b_bar)
+{
+    crm_placed pa;
+    crm_placed pb;
+    place_pair(a, pose_a, b, pose_b, &pa, &pb);
+    if (recipe.kernel == CAROM_POINT_POINT) {
+        point_point_vjp(&pa, &pb, recipe, bar, a_bar, b_bar);
+    } else if (recipe.flipped) {
+        const edge_point k = edge_point_at(&pb, &pa, recipe);
+        const carom_contact_bar g = {crm_neg(bar->normal), bar->arm_b, bar->arm_a, bar->gap};
+        edge_point_vjp(&k, recipe, &g, b_bar, a_bar);
+    } else {
+        const edge_point k = edge_point_at(&pa, &pb, recipe);
+        edge_point_vjp(&k, recipe, bar, a_bar, b_bar);
+    }
+}
