@@ -232,7 +232,7 @@ static carom_status go_to_event(carom_world *w, watch x, double left)
         watch next;
         int any;
         carom_status e = find_root(w, &x, &h);
-        if (!e) e = first_closed(w, &next, &any);
+        if (e >= 0) e = first_closed(w, &next, &any);
         if (e < 0) return e;
         if (!any || next.touches || same_watch(&x, &next)) break;
         x = next;
