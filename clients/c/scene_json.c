@@ -1,0 +1,275 @@
+#include "scene_json.h"
+
+#include "scene_scan.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PLACE_MAX = 256, TEXT_MAX = 1024, READ_BLOCK = 65536 };
+
+void *crm_resize(void *old, size_t n, size_t size)
+{
+    const size_t bytes = n > 0 && size > 0 ? n * size : 1;
+    void *p = size > 0 && n > SIZE_MAX / 2 / size ? NULL : realloc(old, bytes);
+    if (p) return p;
+    fputs("carom: out of memory\n", stderr);
+    exit(2);
+}
+
+void crm_problems_free(crm_problems *problems)
+{
+    for (int i = 0; i < problems->count; i++) free(problems->text[i]);
+    free(problems->text);
+    problems->text = NULL;
+    problems->count = 0;
+}
+
+static void place_append(char *text, size_t size, const char *name, const char *dot)
+{
+    const size_t used = strlen(text);
+    snprintf(text + used, size - used, "%s%s", used ? dot : "", name);
+}
+
+void crm_node_place(const crm_node *node, char *text, size_t size)
+{
+    if (!node->up) {
+        text[0] = '\0';
+        return;
+    }
+    crm_node_place(node->up, text, size);
+    char item[16];
+    snprintf(item, sizeof item, "[%d]", node->index);
+    if (node->key) {
+        place_append(text, size, node->key, ".");
+    } else {
+        place_append(text, size, item, "");
+    }
+}
+
+void crm_fault(crm_problems *problems, const crm_node *at, const char *format, ...)
+{
+    char place[PLACE_MAX] = "";
+    char sentence[TEXT_MAX];
+    if (at) crm_node_place(at, place, sizeof place);
+    int n = snprintf(sentence, sizeof sentence, "%s: %s%s", problems->file, place,
+                     place[0] ? ": " : "");
+    if (n < 0 || n >= TEXT_MAX) n = TEXT_MAX - 1;
+    va_list list;
+    va_start(list, format);
+    vsnprintf(sentence + n, sizeof sentence - (size_t)n, format, list);
+    va_end(list);
+    problems->text = crm_resize(problems->text, (size_t)problems->count + 1, sizeof(char *));
+    char *copy = crm_resize(NULL, strlen(sentence) + 1, 1);
+    strcpy(copy, sentence);
+    problems->text[problems->count++] = copy;
+}
+
+/* All bytes of the stream; NULL when reading fails. */
+static char *read_stream(FILE *f, size_t *length)
+{
+    char *text = NULL;
+    size_t n = 0;
+    for (;;) {
+        text = crm_resize(text, n + READ_BLOCK, 1);
+        const size_t got = fread(text + n, 1, READ_BLOCK, f);
+        n += got;
+        if (got < READ_BLOCK) break;
+    }
+    text[n] = '\0'; /* the last block is never full */
+    *length = n;
+    if (!ferror(f)) return text;
+    free(text);
+    return NULL;
+}
+
+static char *read_file(crm_problems *problems, size_t *length)
+{
+    if (strcmp(problems->file, "-") == 0) {
+        problems->file = "standard input";
+        return read_stream(stdin, length);
+    }
+    FILE *f = fopen(problems->file, "rb");
+    char *text = f ? read_stream(f, length) : NULL;
+    if (f) fclose(f);
+    if (!text) crm_fault(problems, NULL, "cannot be read; check name and permissions");
+    return text;
+}
+
+json_t *crm_json_load(crm_problems *problems)
+{
+    size_t length = 0;
+    char *text = read_file(problems, &length);
+    if (!text) return NULL;
+    json_error_t error;
+    json_t *json = json_loadb(text, length, 0, &error);
+    if (!json) {
+        crm_fault(problems, NULL, "line %d, column %d: %s", error.line, error.column, error.text);
+    } else if (crm_scan_duplicates(text, problems) == 0) {
+        /* Keys that differ in the file only by escapes are left to jansson. */
+        json_t *again = json_loadb(text, length, JSON_REJECT_DUPLICATES, &error);
+        if (!again) crm_fault(problems, NULL, "line %d: %s", error.line, error.text);
+        json_decref(again);
+    }
+    free(text);
+    return json;
+}
+
+crm_node crm_root(const json_t *json)
+{
+    const crm_node root = {json, NULL, NULL, 0};
+    return root;
+}
+
+crm_node crm_member(const crm_node *object, const char *key)
+{
+    const crm_node member = {json_object_get(object->json, key), object, key, 0};
+    return member;
+}
+
+crm_node crm_item(const crm_node *array, int index)
+{
+    const crm_node item = {json_array_get(array->json, (size_t)index), array, NULL, index};
+    return item;
+}
+
+int crm_length(const crm_node *array)
+{
+    return (int)json_array_size(array->json);
+}
+
+/* "is 3", "is a text": what stands there instead. */
+static void describe(const json_t *json, char *text, size_t size)
+{
+    static const char *const kinds[] = {"an object", "an array", "a text", "a number",
+                                        "a number",  "true",     "false",  "null"};
+    const double x = json_number_value(json);
+    if (json_is_number(json)) {
+        snprintf(text, size, "%.17g", x);
+    } else if (json_is_string(json)) {
+        snprintf(text, size, "\"%.40s\"", json_string_value(json));
+    } else {
+        snprintf(text, size, "%s", kinds[json_typeof(json)]);
+    }
+}
+
+static void fault_kind(crm_problems *problems, const crm_node *node, const char *wanted)
+{
+    char found[64];
+    describe(node->json, found, sizeof found);
+    crm_fault(problems, node, "must be %s, is %s", wanted, found);
+}
+
+/* The known names, comma separated. */
+static void join_names(const char *const *names, char *text, size_t size)
+{
+    text[0] = '\0';
+    for (int i = 0; names[i]; i++) place_append(text, size, names[i], ", ");
+}
+
+static int is_known(const char *key, const char *const *keys)
+{
+    if (key[0] == '_' || strcmp(key, "reference") == 0) return 1;
+    for (int i = 0; keys[i]; i++) {
+        if (strcmp(key, keys[i]) == 0) return 1;
+    }
+    return 0;
+}
+
+int crm_check_keys(crm_problems *problems, const crm_node *object, const char *const *keys)
+{
+    if (!json_is_object(object->json)) {
+        fault_kind(problems, object, "an object {...}");
+        return 0;
+    }
+    const char *key;
+    json_t *value;
+    json_object_foreach((json_t *)object->json, key, value)
+    {
+        if (is_known(key, keys)) continue;
+        const crm_node at = {value, object, key, 0};
+        char known[512];
+        join_names(keys, known, sizeof known);
+        crm_fault(problems, &at, "unknown key; known here: %s (keys that start with _ are ignored)",
+                  known);
+    }
+    return 1;
+}
+
+int crm_get_number(crm_problems *problems, const crm_node *node, double *value)
+{
+    if (!node->json) return 0;
+    if (!json_is_number(node->json)) {
+        fault_kind(problems, node, "a number");
+        return 0;
+    }
+    *value = json_number_value(node->json);
+    return 1;
+}
+
+int crm_get_numbers(crm_problems *problems, const crm_node *node, int count, double *values)
+{
+    if (!node->json) return 0;
+    if (!json_is_array(node->json) || crm_length(node) != count) {
+        crm_fault(problems, node, "must be an array of %d numbers", count);
+        return 0;
+    }
+    int good = 1;
+    for (int i = 0; i < count; i++) {
+        const crm_node item = crm_item(node, i);
+        good &= crm_get_number(problems, &item, &values[i]);
+    }
+    return good;
+}
+
+int crm_get_integer(crm_problems *problems, const crm_node *node, double low, double high,
+                    json_int_t *value)
+{
+    double x = 0;
+    if (!crm_get_number(problems, node, &x)) return 0;
+    if (!(x >= low && x <= high && floor(x) == x)) {
+        crm_fault(problems, node, "must be a whole number from %.0f to %.0f, is %.17g", low, high,
+                  x);
+        return 0;
+    }
+    *value = (json_int_t)x;
+    return 1;
+}
+
+int crm_get_flag(crm_problems *problems, const crm_node *node, int *value)
+{
+    if (!node->json) return 0;
+    if (!json_is_boolean(node->json)) {
+        fault_kind(problems, node, "true or false");
+        return 0;
+    }
+    *value = json_is_true(node->json);
+    return 1;
+}
+
+int crm_get_text(crm_problems *problems, const crm_node *node, const char **value)
+{
+    if (!node->json) return 0;
+    if (!json_is_string(node->json)) {
+        fault_kind(problems, node, "a text");
+        return 0;
+    }
+    *value = json_string_value(node->json);
+    return 1;
+}
+
+int crm_get_word(crm_problems *problems, const crm_node *node, const char *const *words)
+{
+    const char *text = NULL;
+    if (!crm_get_text(problems, node, &text)) return -1;
+    for (int i = 0; words[i]; i++) {
+        if (strcmp(text, words[i]) == 0) return i;
+    }
+    char known[512];
+    join_names(words, known, sizeof known);
+    crm_fault(problems, node, "\"%.40s\" is not known; one of: %s", text, known);
+    return -1;
+}
