@@ -1,6 +1,7 @@
 #!/bin/sh
 # run.sh static|shared|solver FOLDER: builds and installs carom into a folder, moves it elsewhere,
 # and uses it from there by CMake and by pkg-config, in C and in C++.
+# run.sh parent FOLDER: builds a project that holds carom as a subfolder.
 set -eu
 kind=$1
 mkdir -p "$2"
@@ -13,6 +14,13 @@ fail() {
     echo "install $kind: $*" >&2
     exit 1
 }
+
+if [ "$kind" = parent ]; then
+    cmake -S "$here/parent" -B "$work" -DCMAKE_BUILD_TYPE=Release
+    cmake --build "$work" --parallel "$jobs"
+    cd "$work"
+    exec ctest --output-on-failure
+fi
 
 case $kind in
 static) set -- -DBUILD_SHARED_LIBS=OFF ;;
