@@ -181,6 +181,9 @@ static inline carom_pose crm_pose(const double *q, int body)
     return p;
 }
 
+/* Requests so far of the world and of all that it owns. */
+long crm_allocations(const carom_world *w);
+
 /* A moving body's index in contact problems; -1 for static ones. */
 static inline int crm_unknown(const carom_world *w, int body)
 {

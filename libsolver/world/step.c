@@ -134,14 +134,9 @@ carom_status carom_world_step(carom_world *world, const double *force, carom_ste
     memset(t, 0, sizeof *t);
     world->error[0] = '\0';
     world->stats = t;
-    size_t bytes;
-    long before;
-    long after;
-    const long calls = world->memory.n_calls;
-    carom_contact_memory(world->solver, &bytes, &before);
+    const long before = crm_allocations(world);
     const carom_status e = step(world, force);
-    carom_contact_memory(world->solver, &bytes, &after);
-    t->allocations = (world->memory.n_calls - calls) + (after - before);
+    t->allocations = crm_allocations(world) - before;
     t->status = e;
     world->stats = NULL;
     return e;

@@ -189,11 +189,22 @@ carom_contact_info carom_world_contact(const carom_world *world, int k)
     return i;
 }
 
+long crm_allocations(const carom_world *w)
+{
+    size_t bytes;
+    long solver;
+    long broadphase;
+    carom_contact_memory(w->solver, &bytes, &solver);
+    carom_broadphase_memory(w->broadphase, &bytes, &broadphase);
+    return w->memory.n_calls + solver + broadphase;
+}
+
 carom_world_size carom_world_measure(const carom_world *world)
 {
     const carom_world *w = world;
     carom_world_size z = {0};
     size_t solver_bytes;
+    size_t pair_bytes;
     long calls;
     for (int b = 0; b < w->n_bodies; b++) {
         z.n_dynamic += w->bodies[b].type == CAROM_DYNAMIC;
@@ -212,7 +223,8 @@ carom_world_size carom_world_measure(const carom_world *world)
                                     w->friction[c->body_b]) > 0;
     }
     carom_contact_memory(w->solver, &solver_bytes, &calls);
-    z.bytes = w->memory.live + solver_bytes;
-    z.bytes_high = w->memory.high + solver_bytes;
+    carom_broadphase_memory(w->broadphase, &pair_bytes, &calls);
+    z.bytes = w->memory.live + solver_bytes + pair_bytes;
+    z.bytes_high = w->memory.high + solver_bytes + pair_bytes;
     return z;
 }

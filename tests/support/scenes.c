@@ -1,0 +1,102 @@
+#include "support/scenes.h"
+
+#include "support/near.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static void must(carom_world *w, carom_status e)
+{
+    if (e < 0) fail_msg("%s: %s", carom_status_name(e), carom_world_error(w));
+}
+
+carom_world *scene_world(double g, double dt)
+{
+    carom_world_settings s = carom_world_defaults();
+    carom_world *w = NULL;
+    s.gravity[1] = -g;
+    s.dt = dt;
+    assert_int_equal(carom_world_create(&s, NULL, &w), CAROM_OK);
+    return w;
+}
+
+static int add_box(carom_world *w, carom_body_def *d, double hx, double hy)
+{
+    const carom_vec2 corners[4] = {{-hx, -hy}, {hx, -hy}, {hx, hy}, {-hx, hy}};
+    const carom_shape shape = {0, 4, corners};
+    int index = -1;
+    d->n_shapes = 1;
+    d->shapes = &shape;
+    must(w, carom_world_add_body(w, d, &index));
+    return index;
+}
+
+int scene_floor(carom_world *w, double friction, double restitution)
+{
+    carom_body_def d = carom_body_defaults();
+    d.type = CAROM_STATIC;
+    d.pose.y = -1;
+    d.friction = friction;
+    d.restitution = restitution;
+    return add_box(w, &d, 20, 1);
+}
+
+int scene_box(carom_world *w, double mass, double hx, double hy, carom_pose pose, double friction,
+              double restitution)
+{
+    carom_body_def d = carom_body_defaults();
+    d.mass = mass;
+    d.inertia = mass * (hx * hx + hy * hy) / 3;
+    d.pose = pose;
+    d.friction = friction;
+    d.restitution = restitution;
+    return add_box(w, &d, hx, hy);
+}
+
+int scene_disc(carom_world *w, double mass, double radius, double x, double y, double friction,
+               double restitution)
+{
+    const carom_vec2 center = {0, 0};
+    const carom_shape shape = {radius, 1, &center};
+    carom_body_def d = carom_body_defaults();
+    int index = -1;
+    d.mass = mass;
+    d.inertia = 0.5 * mass * radius * radius;
+    d.pose.x = x;
+    d.pose.y = y;
+    d.friction = friction;
+    d.restitution = restitution;
+    d.n_shapes = 1;
+    d.shapes = &shape;
+    must(w, carom_world_add_body(w, &d, &index));
+    return index;
+}
+
+int scene_anchor(carom_world *w)
+{
+    carom_body_def d = carom_body_defaults();
+    int index = -1;
+    d.type = CAROM_STATIC;
+    must(w, carom_world_add_body(w, &d, &index));
+    return index;
+}
+
+void scene_push(carom_world *w, int body, double omega, double vx, double vy)
+{
+    const int n = 3 * carom_world_n_bodies(w);
+    double *v = malloc((size_t)n * sizeof *v);
+    assert_non_null(v);
+    memcpy(v, carom_world_v(w), (size_t)n * sizeof *v);
+    v[3 * body] = omega;
+    v[3 * body + 1] = vx;
+    v[3 * body + 2] = vy;
+    must(w, carom_world_set_state(w, NULL, v));
+    free(v);
+}
+
+void scene_run(carom_world *w, int n, carom_step_stats *last)
+{
+    carom_step_stats s = {0};
+    for (int k = 0; k < n; k++) must(w, carom_world_step(w, NULL, &s));
+    if (last) *last = s;
+}

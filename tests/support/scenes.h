@@ -1,0 +1,24 @@
+/* scenes.h: small worlds for tests.  Every function fails the test when a call fails. */
+#ifndef SUPPORT_SCENES_H
+#define SUPPORT_SCENES_H
+
+#include "carom/world.h"
+
+/* Gravity (0, -g), step dt. */
+carom_world *scene_world(double g, double dt);
+/* Static box 40 x 2 whose top is y = 0; index of the body. */
+int scene_floor(carom_world *w, double friction, double restitution);
+/* Dynamic box with half sides hx, hy, uniform density, at (x, y, angle), at rest. */
+int scene_box(carom_world *w, double mass, double hx, double hy, carom_pose pose, double friction,
+              double restitution);
+/* Dynamic disc, uniform density. */
+int scene_disc(carom_world *w, double mass, double radius, double x, double y, double friction,
+               double restitution);
+/* Static body without shape at the origin. */
+int scene_anchor(carom_world *w);
+/* Velocity of one body; the rest is kept. */
+void scene_push(carom_world *w, int body, double omega, double vx, double vy);
+/* n steps; every status must be 0 or positive.  *last (may be NULL): statistics of the last. */
+void scene_run(carom_world *w, int n, carom_step_stats *last);
+
+#endif
