@@ -40,7 +40,8 @@ typedef enum carom_contact_mode {
     CAROM_SEPARATED = 0,
     CAROM_STICK = 1,      /* also: frictionless and closed */
     CAROM_SLIP_MINUS = 2, /* l_t = -mu l_n */
-    CAROM_SLIP_PLUS = 3   /* l_t = +mu l_n */
+    CAROM_SLIP_PLUS = 3,  /* l_t = +mu l_n */
+    CAROM_UNKNOWN = 4     /* in a guess only: take the mode of the free motion */
 } carom_contact_mode;
 
 /* The caller owns the arrays, sized by the problem. */
@@ -100,7 +101,14 @@ CAROM_API carom_status carom_contact_solve(carom_contact_solver *solver,
                                            const carom_contact_problem *problem, int use_guess,
                                            carom_contact_solution *x, carom_contact_stats *stats);
 
-/* The scaled natural residual, EQUATIONS (22), of any point: NaN in x gives HUGE_VAL. */
+/* Why the last solve ended in CAROM_E_INFEASIBLE (Farkas): yn >= 0 (n_contacts) and ye
+ * (n_joint_rows) with W (J_n' yn + J_e' ye) = 0 and yn . (J_n u + c_n) + ye . (J_e u + c_e) < 0, so
+ * that no impulses help.  CAROM_E_STATE after any other end. */
+CAROM_API carom_status carom_contact_certificate(const carom_contact_solver *solver, double *yn,
+                                                 double *ye);
+
+/* The scaled natural residual, EQUATIONS (22), of any point: NaN in x gives HUGE_VAL, as does
+ * memory exhausted (two numbers per velocity are taken from malloc for the call). */
 CAROM_API double carom_contact_residual(const carom_contact_problem *problem,
                                         const carom_contact_solution *x);
 

@@ -1,0 +1,139 @@
+#include "libsolver/contact/ladder.h"
+
+#include <math.h>
+
+/* Compliance of an active row in unit scale: the proximal term [1]. */
+#define PROXIMAL 1e-9
+/* Passes stop when the defect is below this [1] ... */
+#define DEFECT_DONE 1e-15
+/* ... or, below this, no longer halves. */
+#define DEFECT_SMALL 1e-11
+/* A mode is kept while it is violated by less, in unit scale [1]. */
+#define KEEP 1e-11
+/* Passes of one solve. */
+#define PASSES 6
+
+enum { MAX_ROUNDS = 32 };
+
+double crm_slip_sign(unsigned char mode)
+{
+    return mode == CAROM_SLIP_PLUS ? 1 : mode == CAROM_SLIP_MINUS ? -1 : 0;
+}
+
+/* Multipliers as the modes demand: zero when separated, on the cone when slipping. */
+static void set_multipliers(crm_island *s)
+{
+    for (int k = 0; k < s->nc; k++) {
+        const double mu = s->contact[k].mu;
+        if (s->mode[k] == CAROM_SEPARATED) s->x.n[k] = 0;
+        if (s->mode[k] == CAROM_SEPARATED || !(mu > 0)) s->x.t[k] = 0;
+        if (s->mode[k] > CAROM_STICK) s->x.t[k] = crm_slip_sign(s->mode[k]) * mu * s->x.n[k];
+    }
+}
+
+void crm_set_responses(crm_island *s, double compliance)
+{
+    for (int k = 0; k < s->nc; k++) {
+        crm_response *w = &s->response[k];
+        const double mu = s->contact[k].mu;
+        const int active = s->mode[k] != CAROM_SEPARATED;
+        w->nn = active ? 1 / compliance : 0;
+        w->tn = active ? crm_slip_sign(s->mode[k]) * mu / compliance : 0;
+        w->tt = s->mode[k] == CAROM_STICK && mu > 0 ? 1 / compliance : 0;
+    }
+}
+
+/* What is left of the equations at s->x, into s->rhs; returns its largest entry. */
+static double find_defect(crm_island *s)
+{
+    double e = 0;
+    crm_island_defect(s, s->x, s->rhs.z);
+    for (int i = 0; i < 3 * (s->nb + s->ng); i++) e = fmax(e, fabs(s->rhs.z[i]));
+    for (int k = 0; k < s->nc; k++) {
+        const crm_contact *c = &s->contact[k];
+        s->rhs.n[k] = 0;
+        s->rhs.t[k] = 0;
+        if (s->mode[k] == CAROM_SEPARATED) continue;
+        s->rhs.n[k] = -(c->cn + crm_dot(c->n, c->a, c->b, s->x.z));
+        e = fmax(e, fabs(s->rhs.n[k]));
+        if (s->mode[k] != CAROM_STICK || !(c->mu > 0)) continue;
+        s->rhs.t[k] = -(c->ct + crm_dot(c->t, c->a, c->b, s->x.z));
+        e = fmax(e, fabs(s->rhs.t[k]));
+    }
+    return e;
+}
+
+/* [I -B; C delta I] (dw, dl) = defect, repeated: the proximal point iteration, which converges to
+ * the exact solution where rows are independent and to a consistent one where they are not. */
+void crm_solve_modes(crm_island *s, int passes)
+{
+    set_multipliers(s);
+    crm_set_responses(s, PROXIMAL);
+    crm_island_factor(s, 1, PROXIMAL);
+    double last = HUGE_VAL;
+    for (int i = 0; i < passes; i++) {
+        const double e = find_defect(s);
+        if (e < DEFECT_DONE || (e >= 0.5 * last && e < DEFECT_SMALL)) break;
+        last = fmin(e, last);
+        crm_island_reduce(s, s->rhs, s->step);
+        crm_vec_add(s, s->x, 1, s->step);
+    }
+}
+
+void crm_modes_at(crm_island *s)
+{
+    for (int k = 0; k < s->nc; k++) {
+        const crm_contact *c = &s->contact[k];
+        const double a = crm_dot(c->n, c->a, c->b, s->x.z) + c->cn;
+        const double u = c->mu > 0 ? crm_dot(c->t, c->a, c->b, s->x.z) + c->ct : 0;
+        s->mode[k] = (unsigned char)crm_contact_mode_of(c, s->x.n[k], s->x.t[k], a, u);
+    }
+}
+
+/* The new mode violates the old one by less than KEEP only. */
+static int keep_mode(const crm_island *s, int k, unsigned char old, unsigned char new)
+{
+    const double ln = s->x.n[k];
+    const double bound = s->contact[k].mu * fmax(ln, 0);
+    if (old != CAROM_SEPARATED && new == CAROM_SEPARATED) return ln > -KEEP;
+    if (old == CAROM_SEPARATED && new != CAROM_SEPARATED) return s->an[k] > -KEEP;
+    if (old == CAROM_STICK && new > CAROM_STICK) return fabs(s->x.t[k]) <= bound + KEEP;
+    if (old == CAROM_SLIP_MINUS && new == CAROM_STICK) return s->ut[k] > -KEEP;
+    if (old == CAROM_SLIP_PLUS && new == CAROM_STICK) return s->ut[k] < KEEP;
+    return 0;
+}
+
+/* Natural map at the point last measured. */
+static void update_modes(crm_island *s)
+{
+    for (int k = 0; k < s->nc; k++) {
+        const unsigned char to = (unsigned char)crm_contact_mode_of(&s->contact[k], s->x.n[k],
+                                                                    s->x.t[k], s->an[k], s->ut[k]);
+        if (!keep_mode(s, k, s->mode[k], to)) s->mode[k] = to;
+    }
+}
+
+/* FNV-1a. */
+static unsigned long long hash_modes(const crm_island *s)
+{
+    unsigned long long h = 14695981039346656037ULL;
+    for (int k = 0; k < s->nc; k++) h = (h ^ s->mode[k]) * 1099511628211ULL;
+    return h;
+}
+
+int crm_active_set(crm_island *s, int rounds)
+{
+    unsigned long long seen[MAX_ROUNDS];
+    for (int i = 0; i < rounds && i < MAX_ROUNDS; i++) {
+        seen[i] = hash_modes(s);
+        for (int q = 0; q < i; q++) {
+            if (seen[q] == seen[i]) return 0; /* cycles */
+        }
+        crm_solve_modes(s, PASSES);
+        const double r = crm_island_residual(s, s->x);
+        if (crm_island_offer(s, s->x, r)) return 1;
+        if (!(r < HUGE_VAL)) return 0;
+        update_modes(s);
+    }
+    return 0;
+}

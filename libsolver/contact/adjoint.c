@@ -1,0 +1,284 @@
+#include "libsolver/contact/check.h"
+#include "libsolver/contact/ladder.h"
+#include "libsolver/contact/residual.h"
+#include "libsolver/contact/solver.h"
+
+#include <math.h>
+
+/* Compliance of active rows in unit scale: the proximal term [1]. */
+#define PROXIMAL 1e-9
+/* Passes stop when the defect, relative to the cotangent, is below this [1] ... */
+#define DEFECT_DONE 1e-15
+/* ... or, below this, no longer halves. */
+#define DEFECT_SMALL 1e-11
+
+enum { PASSES = 12 };
+
+/* The equations at the active set, with B = [J_n' + s mu J_t' (slip), J_t' (stick), J_e'] and
+ * C = [J_n; J_t (stick); J_e], are  v - u - W B l = 0,  C v + c = 0.  Their adjoint is
+ *   p + C' q = g,   B' W p = 0
+ * and gives, with f = B l:  u_bar = p,  W_bar = p f,  c_bar = -q,  B_bar = (W p) l',
+ * C_bar = -q v'.  This is (30) with d_v = W p, d_l = q. */
+typedef struct adjoint {
+    double *p;  /* 3 n_bodies */
+    double *f;  /* 3 n_bodies */
+    double *qn; /* n_contacts */
+    double *qt;
+    double *qe; /* n_joint_rows */
+} adjoint;
+
+static adjoint carve(double *scratch, const carom_contact_problem *p)
+{
+    adjoint a;
+    a.p = scratch;
+    a.f = a.p + 3 * p->n_bodies;
+    a.qn = a.f + 3 * p->n_bodies;
+    a.qt = a.qn + p->n_contacts;
+    a.qe = a.qt + p->n_contacts;
+    return a;
+}
+
+static int sticks(const crm_island *s, int k)
+{
+    return s->mode[k] == CAROM_STICK && s->contact[k].mu > 0;
+}
+
+/* B' p of contact k. */
+static void project(const crm_island *s, int k, const double *p, double *bn, double *bt)
+{
+    const crm_contact *c = &s->contact[k];
+    *bn = 0;
+    *bt = 0;
+    if (s->mode[k] == CAROM_SEPARATED) return;
+    *bn = crm_dot(c->n, c->a, c->b, p);
+    if (!(c->mu > 0)) return;
+    const double t = crm_dot(c->t, c->a, c->b, p);
+    if (sticks(s, k))
+        *bt = t;
+    else
+        *bn += crm_slip_sign(s->mode[k]) * c->mu * t;
+}
+
+/* z += C' q of contact k, with a factor. */
+static void spread(const crm_island *s, int k, double factor, double qn, double qt, double *z)
+{
+    const crm_contact *c = &s->contact[k];
+    if (s->mode[k] == CAROM_SEPARATED) return;
+    crm_add(z, c->n, c->a, c->b, factor * qn);
+    if (sticks(s, k)) crm_add(z, c->t, c->a, c->b, factor * qt);
+}
+
+/* What is left of p + C' q = g, B' p = 0 at s->x, into s->rhs; returns its largest entry. */
+static double find_defect(crm_island *s, const double *g)
+{
+    double e = 0;
+    double *z = s->rhs.z;
+    for (int i = 0; i < 3 * s->nb; i++) z[i] = g[i] - s->x.z[i];
+    for (int k = 0; k < s->nc; k++) {
+        spread(s, k, -1, s->x.n[k], s->x.t[k], z);
+        project(s, k, s->x.z, &s->rhs.n[k], &s->rhs.t[k]);
+        e = fmax(e, fmax(fabs(s->rhs.n[k]), fabs(s->rhs.t[k])));
+    }
+    for (int q = 0; q < s->ng; q++) {
+        const crm_group *group = &s->group[q];
+        const int at = 3 * (s->nb + q);
+        for (int r = 0; r < CRM_GROUP_ROWS; r++) {
+            crm_add(z, group->j[r], group->a, group->b, -s->x.z[at + r]);
+            z[at + r] = crm_dot(group->j[r], group->a, group->b, s->x.z);
+        }
+    }
+    for (int i = 0; i < 3 * (s->nb + s->ng); i++) e = fmax(e, fabs(z[i]));
+    return e;
+}
+
+/* One proximal pass: dp + C' dq = rhs.z, -B' dp + delta dq = rhs.n, rhs.t; s->x += (dp, dq). */
+static void improve(crm_island *s)
+{
+    double *z = s->step.z;
+    memcpy(z, s->rhs.z, 3 * (size_t)(s->nb + s->ng) * sizeof(double));
+    for (int k = 0; k < s->nc; k++) spread(s, k, -1 / PROXIMAL, s->rhs.n[k], s->rhs.t[k], z);
+    crm_island_solve_transposed(s, z);
+    for (int k = 0; k < s->nc; k++) {
+        double bn;
+        double bt;
+        project(s, k, z, &bn, &bt);
+        s->step.n[k] = (s->rhs.n[k] + bn) / PROXIMAL;
+        s->step.t[k] = (s->rhs.t[k] + bt) / PROXIMAL;
+    }
+    crm_vec_add(s, s->x, 1, s->step);
+}
+
+/* Scaled adjoint of an island: p in s->x.z, q in s->x.n, s->x.t and behind the bodies. */
+static void solve_scaled(crm_island *s, const double *g)
+{
+    double size = 0;
+    double last = HUGE_VAL;
+    for (int i = 0; i < 3 * s->nb; i++) size = fmax(size, fabs(g[i]));
+    crm_vec_zero(s, s->x);
+    if (!(size > 0)) return;
+    crm_set_responses(s, PROXIMAL);
+    crm_island_factor(s, 1, PROXIMAL);
+    for (int i = 0; i < PASSES; i++) {
+        const double e = find_defect(s, g) / size;
+        if (e < DEFECT_DONE || (e >= 0.5 * last && e < DEFECT_SMALL)) break;
+        last = fmin(e, last);
+        improve(s);
+    }
+}
+
+static void set_modes(crm_island *s, const crm_graph *g, int island, const unsigned char *mode)
+{
+    for (int k = 0; k < s->nc; k++) {
+        s->mode[k] = mode[g->contact_of[g->contact_ptr[island] + k]];
+        if (!(s->contact[k].mu > 0) && s->mode[k] > CAROM_STICK) s->mode[k] = CAROM_STICK;
+    }
+}
+
+/* Adjoint of one island into the arrays of a. */
+static void solve_island(carom_contact_solver *c, const carom_contact_problem *p,
+                         const unsigned char *mode, const double *v_bar, int island, adjoint *a)
+{
+    const crm_graph *g = &c->graph;
+    const crm_system *y = &c->system;
+    crm_system_gather(&c->system, g, p, island);
+    crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
+    set_modes(&s, g, island, mode);
+    double *bar = s.size;
+    const double *root = y->root + 3 * g->node_ptr[island];
+    const int *body_of = g->body_of + g->node_ptr[island];
+    for (int i = 0; i < 3 * s.nb; i++) bar[i] = root[i] * v_bar[3 * body_of[i / 3] + i % 3];
+    solve_scaled(&s, bar);
+    for (int i = 0; i < 3 * s.nb; i++) {
+        if (root[i] > 0) a->p[3 * body_of[i / 3] + i % 3] = s.x.z[i] / root[i];
+    }
+    for (int k = 0; k < s.nc; k++) {
+        const int slot = g->contact_ptr[island] + k;
+        a->qn[g->contact_of[slot]] = y->scale_n[slot] * s.x.n[k];
+        a->qt[g->contact_of[slot]] = sticks(&s, k) ? y->scale_t[slot] * s.x.t[k] : 0;
+    }
+    for (int q = 0; q < s.ng; q++) {
+        const int slot = g->group_ptr[island] + q;
+        for (int i = 0; i < g->group_size[slot]; i++)
+            a->qe[g->group_row[slot] + i] = y->scale_e[3 * slot + i] * s.x.z[3 * (s.nb + q) + i];
+    }
+}
+
+static void add_row(double *f, const double *row, const int *body, double l)
+{
+    for (int e = 0; e < 2; e++) {
+        for (int i = 0; body[e] >= 0 && i < 3; i++) f[3 * body[e] + i] += row[3 * e + i] * l;
+    }
+}
+
+/* f = J' l; and p = g - C' q where W = 0. */
+static void finish(const carom_contact_problem *p, const carom_contact_solution *x, adjoint *a,
+                   double *cq)
+{
+    memset(a->f, 0, 3 * (size_t)p->n_bodies * sizeof(double));
+    memset(cq, 0, 3 * (size_t)p->n_bodies * sizeof(double));
+    for (int k = 0; k < p->n_contacts; k++) {
+        const int *body = p->contact_body + 2 * k;
+        add_row(a->f, p->jn + 6 * k, body, x->ln[k]);
+        add_row(cq, p->jn + 6 * k, body, a->qn[k]);
+        if (!crm_has_friction(p, k)) continue;
+        add_row(a->f, p->jt + 6 * k, body, x->lt[k]);
+        add_row(cq, p->jt + 6 * k, body, a->qt[k]);
+    }
+    for (int r = 0; r < p->n_joint_rows; r++) {
+        const int *body = p->joint_body + 2 * r;
+        add_row(a->f, p->je + 6 * r, body, x->le[r]);
+        add_row(cq, p->je + 6 * r, body, a->qe[r]);
+    }
+    for (int i = 0; i < 3 * p->n_bodies; i++) {
+        if (!(p->inv_mass[i] > 0)) a->p[i] -= cq[i];
+    }
+}
+
+/* row_bar = l (W p)' - q v'; nothing for the world. */
+static void row_bar(const carom_contact_problem *p, const adjoint *a, const double *v,
+                    const int *body, double l, double q, double *bar)
+{
+    for (int i = 0; i < 6; i++) {
+        const int at = 3 * body[i / 3] + i % 3;
+        bar[i] = body[i / 3] < 0 ? 0 : l * p->inv_mass[at] * a->p[at] - q * v[at];
+    }
+}
+
+static void write_contacts(const carom_contact_problem *p, const carom_contact_solution *x,
+                           const adjoint *a, carom_contact_bars *bars)
+{
+    for (int k = 0; k < p->n_contacts; k++) {
+        const int *body = p->contact_body + 2 * k;
+        const int friction = crm_has_friction(p, k);
+        const double sign = friction ? crm_slip_sign(x->mode[k]) : 0;
+        if (bars->cn) bars->cn[k] = -a->qn[k];
+        if (bars->ct) bars->ct[k] = -a->qt[k];
+        if (bars->jn) row_bar(p, a, x->v, body, x->ln[k], a->qn[k], bars->jn + 6 * k);
+        if (bars->jt) {
+            const double lt = friction ? x->lt[k] : 0;
+            row_bar(p, a, x->v, body, lt, a->qt[k], bars->jt + 6 * k);
+        }
+        if (!bars->mu) continue;
+        bars->mu[k] = 0;
+        for (int i = 0; i < 6 && sign != 0; i++) {
+            const int at = 3 * body[i / 3] + i % 3;
+            if (body[i / 3] < 0) continue;
+            bars->mu[k] += sign * x->ln[k] * p->jt[6 * k + i] * p->inv_mass[at] * a->p[at];
+        }
+    }
+}
+
+static void write_bars(const carom_contact_problem *p, const carom_contact_solution *x,
+                       const adjoint *a, carom_contact_bars *bars)
+{
+    for (int i = 0; i < 3 * p->n_bodies; i++) {
+        if (bars->u) bars->u[i] = a->p[i];
+        if (bars->inv_mass) bars->inv_mass[i] = a->p[i] * a->f[i];
+    }
+    write_contacts(p, x, a, bars);
+    for (int r = 0; r < p->n_joint_rows; r++) {
+        if (bars->ce) bars->ce[r] = -a->qe[r];
+        if (bars->je)
+            row_bar(p, a, x->v, p->joint_body + 2 * r, x->le[r], a->qe[r], bars->je + 6 * r);
+    }
+}
+
+static int modes_valid(const carom_contact_problem *p, const unsigned char *mode)
+{
+    for (int k = 0; k < p->n_contacts; k++) {
+        if (mode[k] > CAROM_SLIP_PLUS) return 0;
+    }
+    return 1;
+}
+
+/* 9 per body, 2 per contact, 1 per joint row. */
+static carom_status reserve_scratch(carom_contact_solver *c, const carom_contact_problem *p)
+{
+    const int n = 9 * p->n_bodies + 2 * p->n_contacts + p->n_joint_rows;
+    return crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, n, sizeof(double));
+}
+
+carom_status carom_contact_adjoint(carom_contact_solver *solver,
+                                   const carom_contact_problem *problem,
+                                   const carom_contact_solution *x, const double *v_bar,
+                                   carom_contact_bars *bars)
+{
+    const carom_contact_problem *p = problem;
+    carom_status s = crm_contact_check(p);
+    if (s >= 0 && !modes_valid(p, x->mode)) s = CAROM_E_ARGUMENT;
+    if (s >= 0) s = reserve_scratch(solver, p);
+    if (s >= 0) s = crm_solver_prepare(solver, p);
+    if (s < 0) return s;
+    adjoint a = carve(solver->scratch, p);
+    const int n = 3 * p->n_bodies;
+    memset(a.qn, 0, (size_t)(2 * p->n_contacts + p->n_joint_rows) * sizeof(double));
+    for (int i = 0; i < n; i++) a.p[i] = v_bar[i];
+    for (int i = 0; i < solver->graph.n_islands; i++)
+        solve_island(solver, p, x->mode, v_bar, i, &a);
+    finish(p, x, &a, a.qe + p->n_joint_rows);
+    for (int i = 0; i < n; i++) {
+        if (!isfinite(a.p[i])) return CAROM_E_SINGULAR;
+    }
+    write_bars(p, x, &a, bars);
+    return CAROM_OK;
+}

@@ -1,0 +1,237 @@
+#include "libsolver/contact/check.h"
+#include "libsolver/contact/ladder.h"
+#include "libsolver/contact/residual.h"
+#include "libsolver/contact/solver.h"
+
+#include <math.h>
+
+/* A contact is degenerate when its complementary quantities are both below this, in the island's
+ * unit scale [1]. */
+#define DEGENERATE 1e-9
+
+carom_contact_settings carom_contact_defaults(void)
+{
+    return (carom_contact_settings){
+        .accept = 1e-10, .inexact = 1e-6, .max_iterations = 60, .max_restarts = 12};
+}
+
+static int settings_valid(const carom_contact_settings *s)
+{
+    return s->accept > 0 && s->accept < HUGE_VAL && s->inexact >= s->accept &&
+           s->inexact < HUGE_VAL && s->max_iterations > 0 && s->max_restarts >= 0;
+}
+
+carom_status carom_contact_create(const carom_contact_settings *settings,
+                                  const carom_allocator *allocator, carom_contact_solver **out)
+{
+    const carom_contact_settings set = settings ? *settings : carom_contact_defaults();
+    if (!out || !settings_valid(&set)) return CAROM_E_ARGUMENT;
+    crm_memory m = crm_memory_from(allocator);
+    carom_contact_solver *c = crm_new(&m, 1, sizeof *c);
+    if (!c) return CAROM_E_MEMORY;
+    c->memory = m;
+    c->settings = set;
+    c->graph.n_bodies = -1;
+    *out = c;
+    return CAROM_OK;
+}
+
+void carom_contact_destroy(carom_contact_solver *solver)
+{
+    if (!solver) return;
+    crm_memory *m = &solver->memory;
+    crm_graph_free(m, &solver->graph);
+    crm_block_pattern_free(m, &solver->pattern);
+    crm_system_free(m, &solver->system);
+    crm_arena_free(m, &solver->lemke);
+    crm_free(m, solver->scratch, (size_t)solver->scratch_max, sizeof(double));
+    crm_free(m, solver->certificate, (size_t)solver->certificate_max, sizeof(double));
+    crm_memory last = *m;
+    crm_free(&last, solver, 1, sizeof *solver);
+}
+
+void carom_contact_memory(const carom_contact_solver *solver, size_t *bytes, long *calls)
+{
+    *bytes = solver->memory.live;
+    *calls = solver->memory.n_calls;
+}
+
+carom_status crm_solver_prepare(carom_contact_solver *c, const carom_contact_problem *p)
+{
+    crm_memory *m = &c->memory;
+    int same;
+    carom_status s = crm_graph_update(m, &c->graph, p, &same);
+    if (!same) c->pattern_valid = 0;
+    if (s < 0) return s;
+    if (!c->pattern_valid) {
+        s = crm_block_analyze(m, &c->pattern, &c->graph);
+        if (s < 0) return s;
+        c->pattern_valid = 1;
+    }
+    return crm_system_reserve(m, &c->system, &c->graph, &c->pattern);
+}
+
+/* Certificate of one violated prescribed row, in the direction of its violation. */
+static carom_status give_row(carom_contact_solver *c, const carom_contact_problem *p, int row,
+                             double y)
+{
+    const int n = p->n_contacts + p->n_joint_rows;
+    const carom_status s =
+        crm_reserve(&c->memory, (void **)&c->certificate, &c->certificate_max, n, sizeof(double));
+    if (s < 0) return s;
+    memset(c->certificate, 0, (size_t)n * sizeof(double));
+    c->certificate[row] = y;
+    c->certificate_valid = 1;
+    return CAROM_E_INFEASIBLE;
+}
+
+/* Rows that no impulse can change must hold as they are. */
+static carom_status check_prescribed(carom_contact_solver *c, const carom_contact_problem *p)
+{
+    double limit = 0; /* found when needed */
+    for (int k = 0; k < p->n_contacts; k++) {
+        const int *body = p->contact_body + 2 * k;
+        const double a = crm_row_times(p->jn + 6 * k, body, p->u) + p->cn[k];
+        if (a >= 0 || crm_row_weight(p->jn + 6 * k, body, p->inv_mass) > 0) continue;
+        if (!(limit > 0)) limit = c->settings.accept * crm_contact_speed(p);
+        if (a < -limit) return give_row(c, p, k, 1);
+    }
+    for (int r = 0; r < p->n_joint_rows; r++) {
+        const int *body = p->joint_body + 2 * r;
+        if (crm_row_weight(p->je + 6 * r, body, p->inv_mass) > 0) continue;
+        const double e = crm_row_times(p->je + 6 * r, body, p->u) + (p->ce ? p->ce[r] : 0);
+        if (!(limit > 0)) limit = c->settings.accept * crm_contact_speed(p);
+        if (fabs(e) > limit) return give_row(c, p, p->n_contacts + r, e > 0 ? -1 : 1);
+    }
+    return CAROM_OK;
+}
+
+/* The island's certificate, in the problem's rows and units. */
+static carom_status give_certificate(carom_contact_solver *c, const carom_contact_problem *p,
+                                     const crm_island *s, int island)
+{
+    const crm_graph *g = &c->graph;
+    const crm_system *y = &c->system;
+    if (give_row(c, p, 0, 0) == CAROM_E_MEMORY) return CAROM_E_MEMORY;
+    for (int k = 0; k < s->nc; k++) {
+        const int slot = g->contact_ptr[island] + k;
+        c->certificate[g->contact_of[slot]] = y->scale_n[slot] * s->x.n[k];
+    }
+    for (int q = 0; q < s->ng; q++) {
+        const int slot = g->group_ptr[island] + q;
+        for (int i = 0; i < g->group_size[slot]; i++)
+            c->certificate[p->n_contacts + g->group_row[slot] + i] =
+                y->scale_e[3 * slot + i] * s->x.z[3 * (s->nb + q) + i];
+    }
+    return CAROM_E_INFEASIBLE;
+}
+
+/* Weakly active, or on the border of slipping. */
+static int count_degenerate(crm_island *s)
+{
+    int n = 0;
+    crm_island_residual(s, s->best); /* leaves a and u */
+    for (int k = 0; k < s->nc; k++) {
+        const double ln = s->best.n[k];
+        const double bound = s->contact[k].mu * ln;
+        const double u = fabs(s->ut[k]);
+        const int weak = fmax(fabs(s->an[k]), fabs(ln)) < DEGENERATE;
+        const int border = s->contact[k].mu > 0 && ln >= DEGENERATE && u < DEGENERATE &&
+                           fabs(fabs(s->best.t[k]) - bound) < DEGENERATE;
+        n += weak || border;
+    }
+    return n;
+}
+
+static carom_status solve_island(carom_contact_solver *c, const carom_contact_problem *p,
+                                 int island, const unsigned char *guess, carom_contact_stats *stats)
+{
+    const crm_graph *g = &c->graph;
+    crm_system_gather(&c->system, g, p, island);
+    crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
+    s.accept = c->settings.accept;
+    s.max_iterations = c->settings.max_iterations;
+    for (int k = 0; guess && k < s.nc; k++)
+        s.mode[k] = guess[g->contact_of[g->contact_ptr[island] + k]];
+    const crm_ladder ladder = {&c->memory, &c->lemke, c->settings.max_restarts,
+                               c->settings.inexact};
+    carom_contact_stage stage;
+    double unpolished;
+    carom_status status = crm_ladder_climb(&ladder, &s, guess != NULL, &stage, &unpolished);
+    stats->factorizations += s.factorizations;
+    stats->iterations += s.iterations;
+    if (stage > stats->stage) stats->stage = stage;
+    if (status == CAROM_E_INFEASIBLE) return give_certificate(c, p, &s, island);
+    if (status == CAROM_E_MEMORY) return status;
+    stats->residual_unpolished = fmax(stats->residual_unpolished, unpolished);
+    stats->degenerate += count_degenerate(&s);
+    return CAROM_OK;
+}
+
+/* What no island owns: bodies in free flight, rows of prescribed motion. */
+static void write_rest(const crm_graph *g, const carom_contact_problem *p,
+                       carom_contact_solution *x)
+{
+    for (int i = 0; i < 3 * p->n_bodies; i++) x->v[i] = p->u[i];
+    if (g->n_live < p->n_contacts) {
+        for (int k = 0; k < p->n_contacts; k++) {
+            x->ln[k] = 0;
+            x->lt[k] = 0;
+            x->mode[k] = CAROM_SEPARATED;
+        }
+    }
+    for (int r = 0; r < p->n_joint_rows; r++) x->le[r] = 0;
+}
+
+static void write_solution(carom_contact_solver *c, const carom_contact_problem *p,
+                           carom_contact_solution *x)
+{
+    write_rest(&c->graph, p, x);
+    for (int i = 0; i < c->graph.n_islands; i++) {
+        const crm_island s = crm_system_island(&c->system, &c->graph, &c->pattern, i);
+        crm_system_write(&c->system, &c->graph, p, &s, i, x);
+    }
+}
+
+static carom_status judge(const carom_contact_settings *s, double residual)
+{
+    if (residual <= s->accept) return CAROM_OK;
+    return residual <= s->inexact ? CAROM_INEXACT : CAROM_E_NO_SOLUTION;
+}
+
+static carom_status solve(carom_contact_solver *c, const carom_contact_problem *p, int use_guess,
+                          carom_contact_solution *x, carom_contact_stats *stats)
+{
+    carom_status s = crm_contact_check(p);
+    if (s < 0) return s;
+    s = crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, 6 * p->n_bodies,
+                    sizeof(double));
+    if (s >= 0) s = crm_solver_prepare(c, p);
+    if (s >= 0) s = check_prescribed(c, p);
+    for (int i = 0; i < c->graph.n_islands && s >= 0; i++)
+        s = solve_island(c, p, i, use_guess ? x->mode : NULL, stats);
+    if (s < 0) return s;
+    write_solution(c, p, x);
+    stats->residual = crm_contact_residual(p, x, c->scratch);
+    return judge(&c->settings, stats->residual);
+}
+
+carom_status carom_contact_solve(carom_contact_solver *solver, const carom_contact_problem *problem,
+                                 int use_guess, carom_contact_solution *x,
+                                 carom_contact_stats *stats)
+{
+    carom_contact_stats own = {.stage = CAROM_STAGE_NONE, .residual = HUGE_VAL};
+    solver->certificate_valid = 0;
+    own.status = solve(solver, problem, use_guess, x, &own);
+    if (stats) *stats = own;
+    return own.status;
+}
+
+carom_status carom_contact_certificate(const carom_contact_solver *solver, double *yn, double *ye)
+{
+    if (!solver->certificate_valid) return CAROM_E_STATE;
+    const crm_graph *g = &solver->graph;
+    for (int k = 0; k < g->n_contacts; k++) yn[k] = solver->certificate[k];
+    for (int r = 0; r < g->n_rows; r++) ye[r] = solver->certificate[g->n_contacts + r];
+    return CAROM_OK;
+}

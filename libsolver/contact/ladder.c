@@ -1,0 +1,170 @@
+#include "libsolver/contact/ladder.h"
+
+#include <math.h>
+
+enum {
+    ROUNDS_TRY = 5,     /* of the active set from a guess */
+    ROUNDS_POLISH = 8,  /* after the interior point */
+    ROUNDS_REPAIR = 15, /* after sweeps and Lemke */
+    N_SWEEPS = 300,
+    LEMKE_CONTACTS = 150, /* most contacts for Lemke's dense tableau */
+    WIDE_RESTARTS = 6     /* restarts from this one on spread twice as far */
+};
+
+/* One climb. */
+typedef struct climb {
+    const crm_ladder *ladder;
+    crm_island *s;
+    carom_contact_stage *stage;
+    double *unpolished;
+    double large; /* multiplier estimate L */
+} climb;
+
+static int polish(climb *c, carom_contact_stage stage, int rounds)
+{
+    crm_island *s = c->s;
+    *c->unpolished = s->best_residual;
+    *c->stage = stage;
+    return crm_active_set(s, rounds);
+}
+
+/* Contacts that the guess does not know are tested at the free motion. */
+static void set_free_modes(crm_island *s, int unknown_only)
+{
+    for (int k = 0; k < s->nc; k++) {
+        const crm_contact *c = &s->contact[k];
+        if (unknown_only && s->mode[k] <= CAROM_SLIP_PLUS) continue;
+        s->mode[k] = (unsigned char)crm_contact_mode_of(c, 0, 0, c->cn, c->ct);
+    }
+}
+
+static void fit_guess(crm_island *s)
+{
+    set_free_modes(s, 1);
+    for (int k = 0; k < s->nc; k++) {
+        if (!(s->contact[k].mu > 0) && s->mode[k] > CAROM_STICK) s->mode[k] = CAROM_STICK;
+    }
+}
+
+/* No joint, no contact that the free motion violates: nothing to solve. */
+static int is_free(crm_island *s)
+{
+    if (s->ng) return 0;
+    for (int k = 0; k < s->nc; k++) {
+        if (s->contact[k].cn < 0) return 0;
+    }
+    memset(s->mode, CAROM_SEPARATED, (size_t)s->nc);
+    crm_vec_zero(s, s->x);
+    return crm_island_offer(s, s->x, crm_island_residual(s, s->x));
+}
+
+static int try_modes(climb *c, carom_contact_stage stage)
+{
+    crm_vec_zero(c->s, c->s->x);
+    *c->stage = stage;
+    const int done = crm_active_set(c->s, ROUNDS_TRY);
+    *c->unpolished = c->s->best_residual;
+    return done;
+}
+
+static int try_active_sets(climb *c, int use_guess)
+{
+    crm_island *s = c->s;
+    if (use_guess && s->nc) {
+        fit_guess(s);
+        if (try_modes(c, CAROM_STAGE_GUESS)) return 1;
+    }
+    set_free_modes(s, 0);
+    if (try_modes(c, CAROM_STAGE_FREE)) return 1;
+    if (!s->nc) return 0;
+    memset(s->mode, CAROM_STICK, (size_t)s->nc);
+    return try_modes(c, CAROM_STAGE_STICK);
+}
+
+/* L: the largest multiplier when everything sticks. */
+static double estimate_multiplier(crm_island *s)
+{
+    double l = 1;
+    memset(s->mode, CAROM_STICK, (size_t)s->nc);
+    crm_vec_zero(s, s->x);
+    crm_solve_modes(s, 2);
+    for (int k = 0; k < s->nc; k++) l = fmax(l, fmax(fabs(s->x.n[k]), fabs(s->x.t[k])));
+    return fmin(1e8, fmax(10, l));
+}
+
+static int try_interior(climb *c, carom_contact_stage stage, crm_interior_start start)
+{
+    if (crm_interior_point(c->s, start)) {
+        *c->unpolished = c->s->best_residual;
+        *c->stage = stage;
+        return 1;
+    }
+    return polish(c, stage, ROUNDS_POLISH);
+}
+
+static int try_sweeps(climb *c)
+{
+    crm_sweeps(c->s, N_SWEEPS);
+    crm_island_offer(c->s, c->s->x, crm_island_residual(c->s, c->s->x));
+    return polish(c, CAROM_STAGE_SWEEPS, ROUNDS_REPAIR);
+}
+
+/* Returns 1 when accepted, or a negative status. */
+static int try_lemke(climb *c)
+{
+    static const double regular[] = {0, 1e-9, 1e-9, 1e-7};
+    crm_island *s = c->s;
+    if (s->nc > LEMKE_CONTACTS) return 0;
+    crm_arena measure = {0};
+    crm_lemke_layout(s, &measure);
+    const carom_status status =
+        crm_arena_reserve(c->ladder->memory, c->ladder->arena, measure.used);
+    if (status < 0) return status;
+    crm_lemke_work work = crm_lemke_layout(s, c->ladder->arena);
+    for (unsigned i = 0; i < sizeof regular / sizeof *regular; i++) {
+        if (!crm_lemke(s, regular[i], i, &work)) continue;
+        crm_island_offer(s, s->x, crm_island_residual(s, s->x));
+        if (polish(c, CAROM_STAGE_LEMKE, ROUNDS_REPAIR)) return 1;
+    }
+    return 0;
+}
+
+static int try_restarts(climb *c)
+{
+    for (int i = 0; i < c->ladder->max_restarts; i++) {
+        const double ln[] = {10, c->large, 1};
+        const double slack[] = {0.01, 1, 1};
+        const crm_interior_start start = {.ln = ln[i % 3],
+                                          .slack = slack[i % 3],
+                                          .fraction = 0.95,
+                                          .spread = i < WIDE_RESTARTS ? 1 : 2,
+                                          .seed = 1 + (unsigned long long)i};
+        if (try_interior(c, CAROM_STAGE_RESTART, start)) return 1;
+        if (i > 2 && c->s->best_residual <= c->ladder->inexact) return 0;
+    }
+    return 0;
+}
+
+carom_status crm_ladder_climb(const crm_ladder *l, crm_island *s, int use_guess,
+                              carom_contact_stage *stage, double *unpolished)
+{
+    climb c = {l, s, stage, unpolished, 0};
+    *stage = CAROM_STAGE_FREE;
+    *unpolished = 0;
+    if (is_free(s) || try_active_sets(&c, use_guess)) return CAROM_OK;
+    if (s->nc) {
+        c.large = estimate_multiplier(s);
+        const crm_interior_start start = {.ln = c.large, .slack = 1, .fraction = 0.995};
+        if (try_interior(&c, CAROM_STAGE_INTERIOR_POINT, start)) return CAROM_OK;
+    }
+    if (crm_farkas(s)) return CAROM_E_INFEASIBLE;
+    if (!s->nc) return CAROM_E_NO_SOLUTION;
+    const crm_interior_start second = {.ln = 10, .slack = 0.01, .fraction = 0.95};
+    const crm_interior_start third = {.ln = 1, .slack = 1, .fraction = 0.95};
+    if (try_interior(&c, CAROM_STAGE_INTERIOR_POINT, second)) return CAROM_OK;
+    if (try_interior(&c, CAROM_STAGE_INTERIOR_POINT, third)) return CAROM_OK;
+    if (try_sweeps(&c)) return CAROM_OK;
+    const int lemke = try_lemke(&c);
+    if (lemke) return lemke < 0 ? (carom_status)lemke : CAROM_OK;
+    return try_restarts(&c) ? CAROM_OK : CAROM_E_NO_SOLUTION;
+}

@@ -1,0 +1,25 @@
+/* solver.h: the state of a carom_contact_solver. */
+#ifndef CRM_CONTACT_SOLVER_H
+#define CRM_CONTACT_SOLVER_H
+
+#include "libsolver/contact/system.h"
+
+struct carom_contact_solver {
+    crm_memory memory;
+    carom_contact_settings settings;
+    crm_graph graph;
+    crm_block_pattern pattern;
+    int pattern_valid;
+    crm_system system;
+    crm_arena lemke;
+    double *scratch; /* solve: 6 per body; adjoint: see adjoint.c */
+    int scratch_max;
+    double *certificate; /* y_n, then y_e */
+    int certificate_max;
+    int certificate_valid;
+};
+
+/* Graph, pattern and room for the problem. */
+carom_status crm_solver_prepare(carom_contact_solver *c, const carom_contact_problem *p);
+
+#endif

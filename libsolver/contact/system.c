@@ -1,0 +1,292 @@
+#include "libsolver/contact/system.h"
+
+#include "libsolver/contact/residual.h"
+
+#include <float.h>
+#include <math.h>
+
+static void layout(crm_arena *a, crm_system *y, const crm_graph *g, const crm_block_pattern *s)
+{
+    const int nz = s->lp[s->n];
+    const int nn = g->n_nodes;
+    const int nc = g->n_live;
+    const int ng = g->n_groups;
+    y->contact = crm_arena_take(a, (size_t)nc, sizeof(crm_contact));
+    y->group = crm_arena_take(a, (size_t)ng, sizeof(crm_group));
+    y->scale_n = crm_arena_doubles(a, nc);
+    y->scale_t = crm_arena_doubles(a, nc);
+    y->scale_e = crm_arena_doubles(a, 3 * ng);
+    y->root = crm_arena_doubles(a, 3 * nn);
+    y->free = crm_arena_doubles(a, 3 * nn);
+    y->speed = crm_arena_doubles(a, g->n_islands);
+    y->response = crm_arena_take(a, (size_t)nc, sizeof(crm_response));
+    for (int i = 0; i < CRM_N_VECTORS; i++) {
+        y->vec[i].z = crm_arena_doubles(a, 3 * (nn + ng));
+        y->vec[i].n = crm_arena_doubles(a, nc);
+        y->vec[i].t = crm_arena_doubles(a, nc);
+    }
+    y->an = crm_arena_doubles(a, nc);
+    y->ut = crm_arena_doubles(a, nc);
+    for (int i = 0; i < CRM_N_SLACKS; i++) y->slack[i] = crm_arena_doubles(a, nc);
+    y->size = crm_arena_doubles(a, 3 * nn);
+    y->mode = crm_arena_take(a, (size_t)nc, 1);
+    y->best_mode = crm_arena_take(a, (size_t)nc, 1);
+    y->l = crm_arena_take(a, 9 * (size_t)nz, sizeof(double));
+    y->u = crm_arena_take(a, 9 * (size_t)nz, sizeof(double));
+    y->d = crm_arena_take(a, 9 * (size_t)s->n, sizeof(double));
+    y->pivot = crm_arena_ints(a, 2 * s->n);
+    y->lu_work = crm_arena_ints(a, 4 * s->n);
+    y->lu_x = crm_arena_doubles(a, 3 * s->n);
+}
+
+carom_status crm_system_reserve(crm_memory *m, crm_system *y, const crm_graph *g,
+                                const crm_block_pattern *s)
+{
+    crm_arena measure = {0};
+    layout(&measure, y, g, s);
+    const carom_status status = crm_arena_reserve(m, &y->arena, measure.used);
+    if (status < 0) return status;
+    layout(&y->arena, y, g, s);
+    return CAROM_OK;
+}
+
+void crm_system_free(crm_memory *m, crm_system *y)
+{
+    crm_arena_free(m, &y->arena);
+}
+
+/* Scale of a row, 1 / |J sqrt(W)|, or 0. */
+static double row_scale(const carom_contact_problem *p, const double *row, const int *body)
+{
+    const double w = crm_row_weight(row, body, p->inv_mass);
+    return w > 0 ? 1 / sqrt(w) : 0;
+}
+
+/* What a row sees at w = 0. */
+static double row_start(const carom_contact_problem *p, const double *row, const int *body,
+                        double c)
+{
+    return crm_row_times(row, body, p->u) + c;
+}
+
+/* to = scale row sqrt(W); a node whose axis has W = 0 gets 0. */
+static void scale_row(const double *root, const int *node, double scale, const double *row,
+                      double *to)
+{
+    for (int e = 0; e < 2; e++) {
+        for (int i = 0; i < 3; i++) {
+            to[3 * e + i] = node[e] < 0 ? 0 : scale * row[3 * e + i] * root[3 * node[e] + i];
+        }
+    }
+}
+
+/* The island's two velocity scales of (21): of its rows as given, and scaled. */
+typedef struct speeds {
+    double raw;
+    double scaled;
+} speeds;
+
+static void widen(speeds *v, double speed, double scale)
+{
+    v->raw = fmax(v->raw, speed);
+    v->scaled = fmax(v->scaled, speed * scale);
+}
+
+static void gather_contact(crm_system *y, const crm_graph *g, const carom_contact_problem *p,
+                           int slot, const double *root, speeds *v)
+{
+    const int k = g->contact_of[slot];
+    const int *body = p->contact_body + 2 * k;
+    const int *node = g->contact_node + 2 * slot;
+    crm_contact *c = &y->contact[slot];
+    const double *jn = p->jn + 6 * k;
+    const double dn = row_scale(p, jn, body);
+    memset(c, 0, sizeof *c);
+    c->a = node[0];
+    c->b = node[1];
+    y->scale_n[slot] = dn;
+    y->scale_t[slot] = 0;
+    if (!(dn > 0)) return; /* prescribed: see finish_contact */
+    scale_row(root, node, dn, jn, c->n);
+    c->cn = dn * row_start(p, jn, body, p->cn[k]);
+    widen(v, crm_row_speed(jn, body, p->u, p->cn[k]), dn);
+    if (!crm_has_friction(p, k)) return;
+    const double *jt = p->jt + 6 * k;
+    const double dt = row_scale(p, jt, body);
+    if (!(dt > 0)) return;
+    const double ct = p->ct ? p->ct[k] : 0;
+    y->scale_t[slot] = dt;
+    scale_row(root, node, dt, jt, c->t);
+    c->ct = dt * row_start(p, jt, body, ct);
+    c->mu = p->mu[k] * dn / dt;
+    widen(v, crm_row_speed(jt, body, p->u, ct), dt);
+}
+
+static void gather_group(crm_system *y, const crm_graph *g, const carom_contact_problem *p,
+                         int slot, const double *root, speeds *v)
+{
+    crm_group *q = &y->group[slot];
+    memset(q, 0, sizeof *q);
+    q->a = g->group_node[2 * slot];
+    q->b = g->group_node[2 * slot + 1];
+    for (int i = 0; i < CRM_GROUP_ROWS; i++) {
+        const int r = g->group_row[slot] + i;
+        double *scale = &y->scale_e[3 * slot + i];
+        *scale = 0;
+        if (i >= g->group_size[slot]) continue;
+        const int *body = p->joint_body + 2 * r;
+        const double *je = p->je + 6 * r;
+        const double ce = p->ce ? p->ce[r] : 0;
+        *scale = row_scale(p, je, body);
+        if (!(*scale > 0)) continue;
+        scale_row(root, g->group_node + 2 * slot, *scale, je, q->j[i]);
+        q->c[i] = *scale * row_start(p, je, body, ce);
+        widen(v, crm_row_speed(je, body, p->u, ce), *scale);
+    }
+}
+
+/* Velocities in units of `speed`; weights turn scaled rows into the terms of (22). */
+static void finish_contact(crm_system *y, int slot, double speed, double raw)
+{
+    crm_contact *c = &y->contact[slot];
+    const double dn = y->scale_n[slot];
+    const double dt = y->scale_t[slot];
+    c->cn = dn > 0 ? c->cn / speed : 1;
+    c->ct /= speed;
+    c->residual_n = dn > 0 ? speed / (dn * raw) : 0;
+    c->residual_t = dt > 0 ? speed / (dt * raw) : 0;
+}
+
+static void finish_group(crm_system *y, int slot, double speed, double raw)
+{
+    crm_group *q = &y->group[slot];
+    for (int i = 0; i < CRM_GROUP_ROWS; i++) {
+        const double d = y->scale_e[3 * slot + i];
+        q->c[i] /= speed;
+        q->residual[i] = d > 0 ? speed / (d * raw) : 0;
+    }
+}
+
+void crm_system_gather(crm_system *y, const crm_graph *g, const carom_contact_problem *p,
+                       int island)
+{
+    const int n0 = g->node_ptr[island];
+    const int n1 = g->node_ptr[island + 1];
+    double *root = y->root + 3 * n0;
+    for (int i = 0; i < 3 * (n1 - n0); i++)
+        root[i] = sqrt(p->inv_mass[3 * g->body_of[n0 + i / 3] + i % 3]);
+    speeds v = {0, 0};
+    for (int k = g->contact_ptr[island]; k < g->contact_ptr[island + 1]; k++)
+        gather_contact(y, g, p, k, root, &v);
+    for (int q = g->group_ptr[island]; q < g->group_ptr[island + 1]; q++)
+        gather_group(y, g, p, q, root, &v);
+    const double speed = v.scaled < CRM_VELOCITY_NONE ? 1 : v.scaled;
+    const double raw = v.raw < CRM_VELOCITY_NONE ? 1 : v.raw;
+    y->speed[island] = speed;
+    for (int k = g->contact_ptr[island]; k < g->contact_ptr[island + 1]; k++)
+        finish_contact(y, k, speed, raw);
+    for (int q = g->group_ptr[island]; q < g->group_ptr[island + 1]; q++)
+        finish_group(y, q, speed, raw);
+    for (int i = 0; i < 3 * (n1 - n0); i++) {
+        const double u = p->u[3 * g->body_of[n0 + i / 3] + i % 3];
+        y->free[3 * n0 + i] = root[i] > 0 ? u / (root[i] * speed) : 0;
+    }
+}
+
+static crm_vec slice(const crm_vec *v, int block, int contact)
+{
+    return (crm_vec){v->z + 3 * block, v->n + contact, v->t + contact};
+}
+
+static void set_vectors(crm_island *s, const crm_system *y, int block, int contact)
+{
+    s->x = slice(&y->vec[0], block, contact);
+    s->best = slice(&y->vec[1], block, contact);
+    s->top = slice(&y->vec[2], block, contact);
+    s->rhs = slice(&y->vec[3], block, contact);
+    s->rest = slice(&y->vec[4], block, contact);
+    s->step = slice(&y->vec[5], block, contact);
+    s->way[0] = slice(&y->vec[6], block, contact);
+    s->way[1] = slice(&y->vec[7], block, contact);
+}
+
+static crm_block_lu lu_view(const crm_system *y, const crm_block_pattern *s, int first, int n)
+{
+    return (crm_block_lu){.n = n,
+                          .place = s->place + first,
+                          .lp = s->lp + first,
+                          .li = s->li,
+                          .l = y->l,
+                          .u = y->u,
+                          .d = y->d + 9 * (size_t)first,
+                          .pivot = y->pivot + 2 * first,
+                          .work = y->lu_work + 4 * first,
+                          .x = y->lu_x + 3 * first};
+}
+
+crm_island crm_system_island(const crm_system *y, const crm_graph *g, const crm_block_pattern *s,
+                             int island)
+{
+    const int node = g->node_ptr[island];
+    const int contact = g->contact_ptr[island];
+    const int group = g->group_ptr[island];
+    const int first = node + group;
+    crm_island i = {.nb = g->node_ptr[island + 1] - node,
+                    .nc = g->contact_ptr[island + 1] - contact,
+                    .ng = g->group_ptr[island + 1] - group,
+                    .contact = y->contact + contact,
+                    .group = y->group + group,
+                    .free = y->free + 3 * node,
+                    .contact_target = s->contact_target + contact,
+                    .group_target = s->group_target + 2 * group,
+                    .response = y->response + contact,
+                    .an = y->an + contact,
+                    .ut = y->ut + contact,
+                    .size = y->size + 3 * node,
+                    .mode = y->mode + contact,
+                    .best_mode = y->best_mode + contact,
+                    .best_residual = HUGE_VAL};
+    i.lu = lu_view(y, s, first, i.nb + i.ng);
+    for (int k = 0; k < CRM_N_SLACKS; k++) i.slack[k] = y->slack[k] + contact;
+    set_vectors(&i, y, first, contact);
+    return i;
+}
+
+/* v = u + V sqrt(W) w.  Where w differs from J' l by rounding of the velocity scale, it becomes
+ * J' l: no row can see the change, and (4) then holds for small terms too. */
+static void write_motion(const crm_system *y, const crm_graph *g, const carom_contact_problem *p,
+                         const crm_island *s, int island, double *v)
+{
+    double *defect = s->rest.z;
+    crm_island_defect(s, s->best, defect);
+    for (int b = 0; b < s->nb; b++) {
+        const int body = g->body_of[g->node_ptr[island] + b];
+        for (int i = 0; i < 3; i++) {
+            const double d = defect[3 * b + i];
+            const double w = s->best.z[3 * b + i] + (fabs(d) <= CRM_ROUNDING ? d : 0);
+            const double root = y->root[3 * (g->node_ptr[island] + b) + i];
+            v[3 * body + i] = p->u[3 * body + i] + y->speed[island] * root * w;
+        }
+    }
+}
+
+void crm_system_write(const crm_system *y, const crm_graph *g, const carom_contact_problem *p,
+                      const crm_island *s, int island, carom_contact_solution *x)
+{
+    const double speed = y->speed[island];
+    write_motion(y, g, p, s, island, x->v);
+    for (int k = 0; k < s->nc; k++) {
+        const int slot = g->contact_ptr[island] + k;
+        const int c = g->contact_of[slot];
+        x->ln[c] = y->scale_n[slot] * speed * s->best.n[k];
+        x->lt[c] = s->contact[k].mu > 0 ? y->scale_t[slot] * speed * s->best.t[k] : 0;
+        x->mode[c] = s->best_mode[k];
+    }
+    for (int q = 0; q < s->ng; q++) {
+        const int slot = g->group_ptr[island] + q;
+        for (int i = 0; i < g->group_size[slot]; i++) {
+            x->le[g->group_row[slot] + i] =
+                y->scale_e[3 * slot + i] * speed * s->best.z[3 * (s->nb + q) + i];
+        }
+    }
+}

@@ -1,0 +1,50 @@
+/* system.h: the islands of a problem with their scaled values and their work, in one arena. */
+#ifndef CRM_CONTACT_SYSTEM_H
+#define CRM_CONTACT_SYSTEM_H
+
+#include "libsolver/contact/island.h"
+
+typedef struct crm_system {
+    crm_arena arena;
+    crm_contact *contact; /* per slot, like all below */
+    crm_group *group;
+    double *scale_n; /* D_n: 1 / |J_n sqrt(W)|; 0: the row is not felt */
+    double *scale_t;
+    double *scale_e; /* 3 per group */
+    double *root;    /* 3 per node: sqrt(W) */
+    double *free;
+    double *speed; /* per island: velocity unit V of its variables */
+    /* Work of the islands, sliced. */
+    crm_response *response;
+    crm_vec vec[CRM_N_VECTORS];
+    double *an;
+    double *ut;
+    double *slack[CRM_N_SLACKS];
+    double *size;
+    unsigned char *mode;
+    unsigned char *best_mode;
+    double *l;
+    double *u;
+    double *d;
+    int *pivot;
+    int *lu_work;
+    double *lu_x;
+} crm_system;
+
+/* Makes room; nothing is allocated when there is room already. */
+carom_status crm_system_reserve(crm_memory *m, crm_system *y, const crm_graph *g,
+                                const crm_block_pattern *s);
+void crm_system_free(crm_memory *m, crm_system *y);
+
+/* Gathers and scales the values of an island. */
+void crm_system_gather(crm_system *y, const crm_graph *g, const carom_contact_problem *p,
+                       int island);
+/* View of an island. */
+crm_island crm_system_island(const crm_system *y, const crm_graph *g, const crm_block_pattern *s,
+                             int island);
+
+/* Writes the island's best point into the entries of the solution that belong to it. */
+void crm_system_write(const crm_system *y, const crm_graph *g, const carom_contact_problem *p,
+                      const crm_island *s, int island, carom_contact_solution *x);
+
+#endif
