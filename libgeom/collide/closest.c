@@ -17,8 +17,7 @@ static double norm1(carom_vec2 a)
     return fabs(a.x) + fabs(a.y);
 }
 
-/* What rounding may add to a distance between these vertices. */
-static double noise(const crm_placed *a, int i, const crm_placed *b, int j)
+double crm_noise(const crm_placed *a, int i, const crm_placed *b, int j)
 {
     return NEAR_TOL * (norm1(crm_arm(a, i)) + norm1(crm_arm(b, j)));
 }
@@ -46,7 +45,7 @@ static int walk_clear(const crm_placed *a, const crm_placed *b, crm_axis x, doub
         *out = far;
         return 1;
     }
-    return crm_walk(a, b, x, out) && out->gap > noise(a, out->a, b, out->b);
+    return crm_walk(a, b, x, out) && out->gap > crm_noise(a, out->a, b, out->b);
 }
 
 /* Rough center of a core: halfway between vertex 0 and the one half around. */
@@ -83,7 +82,7 @@ static int walk_lengthwise(const crm_placed *a, const crm_placed *b, const crm_c
     const crm_placed *q = on_a ? b : a;
     const int k = on_a ? face->a : face->b;
     const int j = on_a ? face->b : face->a;
-    if (foot_on_face(p, k, q, j, noise(p, k, q, j))) return 0;
+    if (foot_on_face(p, k, q, j, crm_noise(p, k, q, j))) return 0;
     const carom_vec2 e = crm_edge(p, k);
     return walk_clear(a, b, axis_along(a, b, e), reach, out) ||
            walk_clear(a, b, axis_along(a, b, crm_neg(e)), reach, out);
@@ -94,7 +93,7 @@ static crm_closest from_face(const crm_placed *a, const crm_placed *b, const crm
                              double reach)
 {
     crm_closest r;
-    const double tol = noise(a, face->a, b, face->b);
+    const double tol = crm_noise(a, face->a, b, face->b);
     if (face->gap > tol) {
         const carom_vec2 u =
             face->kind == CRM_FACE_A ? crm_normal(a, face->a) : crm_neg(crm_normal(b, face->b));

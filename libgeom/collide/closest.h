@@ -23,6 +23,9 @@ typedef struct crm_closest {
 /* Height of vertex j of q over the line of edge k of p, along the edge's unit outward normal. */
 double crm_height(const crm_placed *p, int k, const crm_placed *q, int j);
 
+/* What rounding may add to a distance between these vertices. */
+double crm_noise(const crm_placed *a, int i, const crm_placed *b, int j);
+
 /* The parts, in closest.c, walk.c, sweep.c and gjk.c. --------------------------------------- */
 
 /* A direction d with its support vertices: certified when d . (b - a) > 0, for then the line across

@@ -41,7 +41,13 @@ static int clip_recipes(const crm_placed *p, int k, const crm_placed *q, int j, 
     /* The incident edge runs against t: its end lies toward the start of e. */
     const double near_start = crm_dot(t, crm_between(p, k, q, i1));
     const double near_end = crm_dot(t, crm_between(p, k, q, i));
-    if (!(near_start <= near_end && near_end >= 0 && near_start <= length)) return 1;
+    if (!(near_start <= near_end)) return 1;
+    if (near_end < 0 || near_start > length) {
+        /* Past an end, by rounding.  Of an edge along the face the nearer vertex. */
+        const double rise = crm_height(p, k, q, i) - crm_height(p, k, q, i1);
+        if (fabs(rise) <= crm_noise(q, i, q, i1)) out[0].inc = near_end < 0 ? i : i1;
+        return 1;
+    }
     out[0] = near_start >= 0 ? recipe_of(CAROM_EDGE_VERTEX, k, i1, flipped)
                              : recipe_of(CAROM_EDGE_CLIPPED, k, i, flipped);
     out[1] = near_end <= length ? recipe_of(CAROM_EDGE_VERTEX, k, i, flipped)

@@ -1,0 +1,224 @@
+/* carom_collide against a long-double reference that tries everything, on random pairs of every
+ * kind in every situation.  The reference shares no code and no idea with the library.
+ *
+ * Usage: test_collide_random [pairs per situation] (2000). */
+#include "carom/collide.h"
+#include "collide_ref.h"
+#include "near.h"
+#include "rng.h"
+
+#include <float.h>
+#include <stdlib.h>
+
+static int n_pairs = 2000;
+
+typedef struct body {
+    carom_shape shape;
+    carom_pose pose;
+    carom_vec2 vertices[64];
+} body;
+
+typedef struct situation {
+    const char *name;
+    double size;    /* of the shapes [m] */
+    double far;     /* of the pair from the origin [m] */
+    double thin;    /* aspect ratio */
+    double gap_low; /* of the shapes, log10 of its share of the size; 0: as it comes */
+    double gap_high;
+    int lattice; /* small integer coordinates and right angles */
+    int n_max;   /* vertices */
+} situation;
+
+static const situation SITUATIONS[] = {
+    {"generic", 1, 3, 0.2, 0, 0, 0, 64},
+    {"few vertices", 1, 3, 0.2, 0, 0, 0, 5},
+    {"near touching", 1, 3, 0.2, -12, -3, 0, 64},
+    {"near touching, few vertices", 1, 3, 0.2, -12, -3, 0, 5},
+    {"slivers", 1, 3, 1e-3, 0, 0, 0, 8},
+    {"slivers near touching", 1, 3, 1e-3, -12, -3, 0, 8},
+    {"needles", 1, 3, 1e-8, 0, 0, 0, 4},
+    {"lattice", 1, 0, 1, 0, 0, 1, 4},
+    {"far", 1, 1e6, 0.2, 0, 0, 0, 16},
+    {"small", 1e-6, 3e-6, 0.2, 0, 0, 0, 16},
+    {"large", 1e6, 3e6, 0.2, 0, 0, 0, 16},
+    {"tiny", 1e-8, 0, 0.2, -9, -3, 0, 16},
+    {"huge", 1e8, 0, 0.2, -9, -3, 0, 16},
+};
+
+/* Vertices on an ellipse at jittered angles: convex, in any orientation, not around the origin. */
+static void random_hull(rng *r, const situation *s, int n, carom_vec2 *v)
+{
+    const double pi = 3.14159265358979323846;
+    const double tilt = rng_uniform(r, 0, 2 * pi);
+    const double start = rng_uniform(r, 0, 2 * pi);
+    const double width = s->size * rng_uniform(r, 0.3, 1.0);
+    const double height = width * (s->thin < 0.1 ? s->thin : rng_uniform(r, s->thin, 1.0));
+    const double x0 = width * rng_uniform(r, -0.3, 0.3);
+    for (int i = 0; i < n; i++) {
+        const double t = start + 2 * pi * (i + rng_uniform(r, -0.3, 0.3)) / n;
+        const double x = x0 + width * cos(t);
+        const double y = height * sin(t);
+        v[i].x = cos(tilt) * x - sin(tilt) * y;
+        v[i].y = sin(tilt) * x + cos(tilt) * y;
+    }
+}
+
+/* Boxes and diamonds on integers, segments, circles of radius 1. */
+static void lattice_body(rng *r, body *b)
+{
+    const int w = 1 + rng_int(r, 3);
+    const int h = 1 + rng_int(r, 3);
+    const carom_vec2 box[4] = {{-w, -h}, {w, -h}, {w, h}, {-w, h}};
+    const carom_vec2 diamond[4] = {{0, -h}, {w, 0}, {0, h}, {-w, 0}};
+    const int kind = rng_int(r, 4);
+    b->shape.count = kind == 0 ? 1 : kind == 1 ? 2 : 4;
+    for (int i = 0; i < b->shape.count; i++) {
+        b->vertices[i] = kind == 3 ? diamond[i] : box[kind == 1 ? 2 * i : i];
+    }
+    if (kind == 0) b->vertices[0].x = b->vertices[0].y = 0;
+    b->shape.radius = b->shape.count == 1 ? 1 : rng_int(r, 2);
+    b->pose.angle = 0;
+    b->pose.x = rng_int(r, 9) - 4;
+    b->pose.y = rng_int(r, 9) - 4;
+}
+
+static void random_body(rng *r, const situation *s, body *b)
+{
+    b->shape.vertices = b->vertices;
+    if (s->lattice) {
+        lattice_body(r, b);
+        return;
+    }
+    const int many = rng_int(r, 4) == 0;
+    b->shape.count = 1 + rng_int(r, many ? s->n_max : 4);
+    random_hull(r, s, b->shape.count, b->vertices);
+    b->shape.radius = 0;
+    if (b->shape.count == 1 || rng_int(r, 3) == 0) {
+        b->shape.radius = s->size * rng_uniform(r, 0.01, 0.5);
+    }
+    b->pose.angle = rng_uniform(r, -4, 4);
+    b->pose.x = s->size * rng_uniform(r, -1.5, 1.5);
+    b->pose.y = s->size * rng_uniform(r, -1.5, 1.5);
+}
+
+/* Moves B along the normal so that the gap becomes the wanted one. */
+static void set_gap(rng *r, const situation *s, body *a, body *b)
+{
+    static collide_ref_shape ra, rb;
+    collide_ref_place(&a->shape, a->pose, &b->shape, b->pose, &ra, &rb);
+    const collide_ref ref = collide_ref_solve(&ra, &rb);
+    const double share = pow(10, rng_uniform(r, s->gap_low, s->gap_high));
+    const double gap = s->size * share * (rng_int(r, 2) ? 1 : -1);
+    const double move = gap - (double)ref.distance;
+    b->pose.x += move * (double)ref.nx;
+    b->pose.y += move * (double)ref.ny;
+}
+
+static void random_pair(rng *r, const situation *s, body *a, body *b)
+{
+    do random_body(r, s, a);
+    while (carom_shape_check(&a->shape, NULL));
+    do random_body(r, s, b);
+    while (carom_shape_check(&b->shape, NULL));
+    if (s->gap_low != 0) set_gap(r, s, a, b);
+    const double x = s->far * rng_uniform(r, -1, 1);
+    const double y = s->far * rng_uniform(r, -1, 1);
+    a->pose.x += x;
+    a->pose.y += y;
+    b->pose.x += x;
+    b->pose.y += y;
+}
+
+static void describe(const char *name, const body *s)
+{
+    print_error("%s: pose %.17g %.17g %.17g, radius %.17g\n", name, s->pose.angle, s->pose.x,
+                s->pose.y, s->shape.radius);
+    for (int i = 0; i < s->shape.count; i++) {
+        print_error("    {%.17g, %.17g}\n", s->vertices[i].x, s->vertices[i].y);
+    }
+}
+
+static long double angle_of(carom_vec2 n, const collide_ref *ref)
+{
+    return atan2l(fabsl(n.x * ref->ny - n.y * ref->nx), n.x * ref->nx + n.y * ref->ny);
+}
+
+/* Distances carry some roundings of the coordinates: the shapes' own and the offset between them.
+ */
+static double rounding(const collide_ref_shape *b, const collide_ref *ref)
+{
+    return 40 * DBL_EPSILON * (double)(ref->size + fabsl(b->at_x) + fabsl(b->at_y));
+}
+
+/* What is wrong with the manifold, NULL when nothing. */
+static const char *fault_in(const body *a, const body *b, const carom_manifold *m)
+{
+    static collide_ref_shape ra, rb;
+    collide_ref_place(&a->shape, a->pose, &b->shape, b->pose, &ra, &rb);
+    const collide_ref ref = collide_ref_solve(&ra, &rb);
+    /* Of faces tied within 1e-14 of the extent (<= 2 sizes) the first is taken. */
+    const double tie = m->ambiguous ? 2e-14 * (double)ref.size : 0;
+    const double tol = rounding(&rb, &ref) + tie;
+    const carom_vec2 n = m->normal;
+    if (!(fabsl(m->distance - ref.distance) <= tol)) return "distance";
+    if (!(fabs(hypot(n.x, n.y) - 1) <= 4 * DBL_EPSILON)) return "normal is not a unit vector";
+    /* Along the normal the supports are as far apart as the shapes... */
+    const long double h = collide_ref_support(&ra, &rb, n.x, n.y);
+    if (!(fabsl(h - ref.distance) <= 2 * tol)) return "normal does not attain the distance";
+    /* ...and where it is unique, its error is rounding over the distance of the cores. */
+    const int overlap = ref.gap < 0;
+    if (ref.gap > 0 && !(angle_of(n, &ref) * ref.gap <= tol)) return "normal";
+    if (overlap && ref.gap - ref.second > tol && !m->ambiguous &&
+        !(angle_of(n, &ref) <= 1e-12L)) { /* an edge 1e-3 of the extent, rounded */
+        return "normal of the overlap";
+    }
+    double least = HUGE_VAL;
+    for (int i = 0; i < m->count; i++) {
+        const carom_contact_point *p = &m->points[i];
+        const double dx = (double)rb.at_x + p->arm_b.x - p->arm_a.x;
+        const double dy = (double)rb.at_y + p->arm_b.y - p->arm_a.y;
+        /* A clipped point lies in the middle of an edge that may be steep: the same roundings. */
+        if (!(hypot(dx - p->gap * n.x, dy - p->gap * n.y) <= tol)) return "points off the normal";
+        const long double ca =
+            collide_ref_outline(&ra, p->arm_a.x - ra.radius * n.x, p->arm_a.y - ra.radius * n.y);
+        const long double cb = collide_ref_outline(&rb, rb.at_x + p->arm_b.x + rb.radius * n.x,
+                                                   rb.at_y + p->arm_b.y + rb.radius * n.y);
+        if (!(ca <= tol)) return "point off A";
+        if (!(cb <= tol)) return "point off B";
+        least = fmin(least, p->gap);
+    }
+    if (!(fabs(least - m->distance) <= tol)) return "no point has the distance";
+    return NULL;
+}
+
+static void check_situation(const situation *s, uint64_t seed)
+{
+    rng r = rng_from(seed);
+    static body a, b;
+    for (int k = 0; k < n_pairs; k++) {
+        random_pair(&r, s, &a, &b);
+        const carom_manifold m = carom_collide(&a.shape, a.pose, &b.shape, b.pose, HUGE_VAL);
+        const char *fault = fault_in(&a, &b, &m);
+        if (fault) {
+            describe("A", &a);
+            describe("B", &b);
+            fail_msg("%s, pair %d: %s; distance %.17g, normal (%.17g, %.17g), %d points", s->name,
+                     k, fault, m.distance, m.normal.x, m.normal.y, m.count);
+        }
+    }
+}
+
+static void every_situation(void **state)
+{
+    (void)state;
+    for (size_t k = 0; k < sizeof SITUATIONS / sizeof *SITUATIONS; k++) {
+        check_situation(&SITUATIONS[k], 20 + k);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(every_situation)};
+    if (argc > 1) n_pairs = atoi(argv[1]);
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
