@@ -1,8 +1,8 @@
 /* Gradients of whole runs against central differences and closed forms. */
-#include "support/fdiff.h"
-#include "support/near.h"
-#include "support/rng.h"
-#include "support/scenes.h"
+#include "fdiff.h"
+#include "near.h"
+#include "rng.h"
+#include "scenes.h"
 
 #include "carom/grad.h"
 #include "libsolver/world/internal.h" /* to move single numbers of a world for the differences */

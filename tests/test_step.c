@@ -1,6 +1,6 @@
 /* The Euler step against closed forms, docs/math/equations.md section 6. */
-#include "support/near.h"
-#include "support/scenes.h"
+#include "near.h"
+#include "scenes.h"
 
 #define PI 3.14159265358979323846
 

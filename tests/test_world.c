@@ -1,7 +1,7 @@
 /* Building, refusing, and worlds that lack something. */
-#include "support/alloc_fail.h"
-#include "support/near.h"
-#include "support/scenes.h"
+#include "alloc_fail.h"
+#include "near.h"
+#include "scenes.h"
 
 #include "carom/carom.h"
 

@@ -42,11 +42,23 @@ static void add_position_geometry(crm_reverse *r, const crm_substep *s, const do
     }
 }
 
+/* d = q' - q of the moving bodies. */
+static void displacement(const carom_world *w, const double *after, const double *before, double *d)
+{
+    for (int b = 0; b < w->n_bodies; b++) {
+        const int i = crm_unknown(w, b);
+        for (int k = 0; i >= 0 && k < 3; k++) d[3 * i + k] = after[3 * b + k] - before[3 * b + k];
+    }
+}
+
 /* q' = q + d(q): the frictionless problem of a position correction. */
-static carom_status projection_vjp(crm_reverse *r, crm_substep *s, const crm_projection *c,
-                                   double *q_bar, int with_parameters)
+static carom_status projection_vjp(crm_reverse *r, crm_substep *s, int index, double *q_bar,
+                                   int with_parameters)
 {
     carom_world *w = r->world;
+    const crm_projection *c = &s->projection[index];
+    const double *after = index + 1 < s->n_projections ? c[1].q : s->q1;
+    displacement(w, after, c->q, w->rows.v);
     const carom_contact_problem p = crm_position_problem(w, s, c->q, NULL);
     const carom_contact_solution x = {w->rows.v, c->ln, s->moved_lt, c->le, c->mode};
     gather(w, q_bar, r->velocity_bar);
@@ -182,7 +194,7 @@ carom_status crm_substep_vjp(crm_reverse *r, const crm_substep *recorded, double
     s.moved = r->moved;
     s.moved_lt = r->moved_lt;
     for (int k = s.n_projections - 1; k >= 0; k--) {
-        const carom_status e = projection_vjp(r, &s, &s.projection[k], q_bar, with_parameters);
+        const carom_status e = projection_vjp(r, &s, k, q_bar, with_parameters);
         if (e < 0) return e;
     }
     return velocity_vjp(r, &s, q_bar, v_bar, with_parameters, h_bar);

@@ -34,6 +34,7 @@ static void pack(const carom_tape *t, const crm_substep *s, crm_block *b, crm_su
     to->lt = keep(b, s->lt, m, sizeof(double));
     to->cn = keep(b, s->cn, m, sizeof(double));
     to->mode = keep(b, s->mode, m, 1);
+    to->pressing = keep(b, s->pressing, m, 1);
     for (int k = 0; k < s->n_projections; k++) {
         const crm_projection *p = &s->projection[k];
         to->projection[k].q = keep(b, p->q, n3(t), sizeof(double));

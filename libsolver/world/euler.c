@@ -64,9 +64,52 @@ static void move(carom_world *w, double *q, const double *displacement, double s
     }
 }
 
-static void guess_closed(int n, const unsigned char *from, unsigned char *to)
+/* Contacts that pressed and did not bounce. */
+static void mark_pressing(crm_substep *s)
 {
-    for (int k = 0; k < n; k++) to[k] = from[k] ? CAROM_STICK : CAROM_SEPARATED;
+    for (int k = 0; k < s->n_contacts; k++) {
+        const int bounces = s->cn[k] < 0 && !s->contacts[k].speculative;
+        s->pressing[k] = s->mode[k] != CAROM_SEPARATED && s->ln[k] > 0 && !bounces;
+    }
+}
+
+/* A pressing contact that the correction lets go presses no longer; 1 when there was one. */
+static int release(crm_substep *s, const crm_projection *c)
+{
+    int any = 0;
+    for (int k = 0; k < s->n_contacts; k++) {
+        if (!s->pressing[k] || c->mode[k] != CAROM_SEPARATED) continue;
+        s->pressing[k] = 0;
+        any = 1;
+    }
+    return any;
+}
+
+/* One correction at c->q: multipliers, modes, and the displacement in rows.v. */
+static carom_status correct(carom_world *w, crm_substep *s, crm_projection *c)
+{
+    carom_contact_stats stats = {0};
+    carom_contact_solution x = {w->rows.v, c->ln, s->moved_lt, c->le, c->mode};
+    for (int again = 1; again;) {
+        const carom_contact_problem p = crm_position_problem(w, s, c->q, NULL);
+        const carom_status e = carom_contact_solve(w->solver, &p, 1, &x, &stats);
+        if (e < 0) return e;
+        add_stats(w, &stats);
+        again = release(s, c);
+    }
+    for (int k = 0; k < s->n_contacts; k++) {
+        if (s->pressing[k]) c->ln[k] -= s->h * s->ln[k];
+    }
+    for (int k = 0; k < 2 * w->n_joints; k++) c->le[k] -= s->h * s->le[k];
+    return CAROM_OK;
+}
+
+/* Nothing to correct: the correction is zero, but its derivative is not; the reverse pass needs to
+ * know what is held. */
+static void correct_nothing(carom_world *w, const crm_substep *s, crm_projection *c)
+{
+    memset(c->le, 0, 2 * (size_t)w->n_joints * sizeof *c->le);
+    if (s->n_contacts) memset(c->ln, 0, (size_t)s->n_contacts * sizeof *c->ln);
 }
 
 carom_status crm_project(carom_world *w, crm_substep *s)
@@ -77,18 +120,22 @@ carom_status crm_project(carom_world *w, crm_substep *s)
     for (int k = 0; k < CRM_MAX_PROJECTIONS; k++) {
         crm_projection *c = &s->projection[k];
         double violation;
-        const carom_contact_problem p = crm_position_problem(w, s, s->q1, &violation);
-        if (violation <= tol) break;
+        crm_position_problem(w, s, s->q1, &violation);
+        if (k && violation <= tol) break;
         memcpy(c->q, s->q1, 3 * (size_t)w->n_bodies * sizeof(double));
-        guess_closed(s->n_contacts, k ? s->projection[k - 1].mode : s->mode, c->mode);
-        carom_contact_solution x = {w->rows.v, c->ln, s->moved_lt, c->le, c->mode};
-        carom_contact_stats stats = {0};
-        const carom_status e = carom_contact_solve(w->solver, &p, 1, &x, &stats);
-        if (e == CAROM_E_MEMORY) return e;
-        if (e < 0) return CAROM_LIMIT;
-        add_stats(w, &stats);
-        move(w, s->q1, w->rows.v, 1);
+        for (int i = 0; i < s->n_contacts; i++) {
+            const int closed = s->pressing[i] || (k && c[-1].mode[i]);
+            c->mode[i] = closed ? CAROM_STICK : CAROM_SEPARATED;
+        }
         s->n_projections = k + 1;
+        if (violation <= tol) {
+            correct_nothing(w, s, c);
+            break;
+        }
+        const carom_status e = correct(w, s, c);
+        if (e < 0) s->n_projections = k;
+        if (e < 0) return e == CAROM_E_MEMORY ? e : CAROM_LIMIT;
+        move(w, s->q1, w->rows.v, 1);
     }
     return CAROM_OK;
 }
@@ -107,6 +154,7 @@ carom_status crm_euler(carom_world *w, double h)
         if (i >= 0) memcpy(&s->v1[3 * b], &w->rows.v[3 * i], 3 * sizeof(double));
     }
     move(w, s->q1, w->rows.v, h);
+    mark_pressing(s);
     return crm_project(w, s);
 }
 

@@ -74,14 +74,15 @@ typedef struct crm_substep {
     int degenerate;      /* weakly active or stick/slip borderline contacts */
     int n_contacts;
     int max_contacts;
-    crm_contact *contacts; /* geometry at q0 */
-    crm_contact *moved;    /* the same contacts at the pose of the latest correction */
-    double *moved_lt;      /* zeros: corrections have no friction */
-    double *ln, *lt;       /* per contact */
-    double *cn;            /* per contact: restitution or speculative gap / h */
-    unsigned char *mode;   /* per contact */
-    double *le;            /* per joint row */
-    double restitution;    /* factor on all restitutions: 1, or 0 when relaxed */
+    crm_contact *contacts;   /* geometry at q0 */
+    crm_contact *moved;      /* the same contacts at the pose of the latest correction */
+    double *moved_lt;        /* zeros: corrections have no friction */
+    double *ln, *lt;         /* per contact */
+    double *cn;              /* per contact: restitution or speculative gap / h */
+    unsigned char *mode;     /* per contact */
+    unsigned char *pressing; /* per contact: closed by force, so held at gap 0 from both sides */
+    double *le;              /* per joint row */
+    double restitution;      /* factor on all restitutions: 1, or 0 when relaxed */
     int n_projections;
     crm_projection projection[CRM_MAX_PROJECTIONS];
     crm_end end;
@@ -226,8 +227,8 @@ void crm_contact_rows(const crm_contact *c, double jn[6], double jt[6]);
 void crm_joint_rows(const crm_joint *j, const double *q, double je[12], double error[2]);
 /* Problem of the velocity update: u = v0 + h (W f + g), rows of sub.contacts at q0. */
 carom_contact_problem crm_velocity_problem(carom_world *w, crm_substep *s);
-/* Problem of a position correction at q, contacts refreshed there; *violation [m] is the largest
- * overlap or joint error. */
+/* Problem of a position correction at q, contacts refreshed there, docs/step.md; *violation [m] is
+ * the largest overlap, gap of a pressing contact or joint error. */
 carom_contact_problem crm_position_problem(carom_world *w, crm_substep *s, const double *q,
                                            double *violation);
 /* Largest joint error at q [m]. */

@@ -109,6 +109,15 @@ double crm_joint_drift(const carom_world *w, const double *q)
     return largest;
 }
 
+/* x += scale J' for one row; x has three numbers per moving body. */
+static void add_row(double *x, const int body[2], const double row[6], double scale)
+{
+    for (int side = 0; side < 2; side++) {
+        if (body[side] < 0) continue;
+        for (int i = 0; i < 3; i++) x[3 * body[side] + i] += scale * row[3 * side + i];
+    }
+}
+
 static void fill_inverse_masses(carom_world *w)
 {
     for (int b = 0; b < w->n_bodies; b++) {
@@ -184,6 +193,21 @@ carom_contact_problem crm_velocity_problem(carom_world *w, crm_substep *s)
     return p;
 }
 
+/* The displacement that the pressing contacts and the joints of this sub-step gave, taken back:
+ * u = -h W (Jn' ln + Je' le), rows at the pose of the correction. */
+static void fill_withdrawn(carom_world *w, const crm_substep *s)
+{
+    crm_rows *r = &w->rows;
+    memset(r->u, 0, 3 * (size_t)w->n_moving * sizeof(double));
+    for (int k = 0; k < s->n_contacts; k++) {
+        if (s->pressing[k]) add_row(r->u, &r->contact_body[2 * k], &r->jn[6 * k], -s->h * s->ln[k]);
+    }
+    for (int k = 0; k < 2 * w->n_joints; k++) {
+        add_row(r->u, &r->joint_body[2 * k], &r->je[6 * k], -s->h * s->le[k]);
+    }
+    for (int k = 0; k < 3 * w->n_moving; k++) r->u[k] *= r->inv_mass[k];
+}
+
 carom_contact_problem crm_position_problem(carom_world *w, crm_substep *s, const double *q,
                                            double *violation)
 {
@@ -192,12 +216,13 @@ carom_contact_problem crm_position_problem(carom_world *w, crm_substep *s, const
     for (int k = 0; k < s->n_contacts; k++) {
         s->moved[k] = s->contacts[k];
         crm_contact_refresh(w, q, &s->moved[k]);
-        w->rows.cn[k] = s->moved[k].gap;
-        largest = fmax(largest, -s->moved[k].gap);
+        const double gap = s->moved[k].gap;
+        w->rows.cn[k] = gap;
+        largest = fmax(largest, s->pressing[k] ? fabs(gap) : -gap);
     }
     fill_contacts(w, s->n_contacts, s->moved);
     largest = fmax(largest, fill_joints(w, q));
-    memset(w->rows.u, 0, 3 * (size_t)w->n_moving * sizeof(double));
+    fill_withdrawn(w, s);
     if (violation) *violation = largest;
     carom_contact_problem p = problem_of(w, s->n_contacts);
     p.mu = w->rows.zero;

@@ -111,7 +111,8 @@ static carom_status project_once(carom_world *w)
     crm_substep *s = &w->sub;
     const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
     memcpy(s->q1, w->q, bytes);
-    memset(s->mode, CAROM_STICK, (size_t)s->n_contacts);
+    memset(s->pressing, 0, (size_t)s->n_contacts);
+    s->h = 0;
     const carom_status e = crm_project(w, s);
     if (e < 0) return e;
     memcpy(w->q, s->q1, bytes);

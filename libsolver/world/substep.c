@@ -51,6 +51,7 @@ static void lay_contacts(const carom_world *w, int n, crm_block *b, void *object
     s->lt = crm_carve(b, m, sizeof(double));
     s->cn = crm_carve(b, m, sizeof(double));
     s->mode = crm_carve(b, m, 1);
+    s->pressing = crm_carve(b, m, 1);
     for (int k = 0; k < CRM_MAX_PROJECTIONS; k++) {
         s->projection[k].ln = crm_carve(b, m, sizeof(double));
         s->projection[k].mode = crm_carve(b, m, 1);

@@ -1,6 +1,6 @@
-#include "support/scenes.h"
+#include "scenes.h"
 
-#include "support/near.h"
+#include "near.h"
 
 #include <stdlib.h>
 #include <string.h>
