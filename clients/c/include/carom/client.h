@@ -84,7 +84,7 @@ typedef struct carom_client_state {
 
 /* Force on one body in one step, added to its constant force. */
 typedef struct carom_client_force {
-    int step; /* 0: the first step of the call */
+    int step; /* 0: the first step of the call; forces are in the order of steps */
     int body;
     double force[3]; /* torque, fx, fy */
 } carom_client_force;
@@ -96,7 +96,7 @@ typedef enum carom_client_record {
 } carom_client_record;
 
 typedef struct carom_client_run {
-    int n_steps;       /* >= 1 */
+    int n_steps;       /* >= 0 */
     int publish_every; /* states wanted: every n-th step and the last; 0: the last only */
     int contacts;      /* with contact points */
     carom_client_record record;
