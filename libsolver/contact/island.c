@@ -104,10 +104,8 @@ double crm_island_residual(crm_island *s, crm_vec x)
         if (!(c->mu > 0)) continue;
         const double u = crm_dot(c->t, c->a, c->b, x.z) + c->ct;
         s->ut[k] = u;
-        const double bound = c->mu * fmax(x.n[k], 0);
-        const double t = x.t[k] - fmax(-bound, fmin(bound, x.t[k] - u));
-        if (isnan(u) || isnan(x.t[k])) return HUGE_VAL;
-        error = worst(error, fabs(t) * c->residual_t);
+        const double e = crm_friction_error(c->mu * fmax(x.n[k], 0), x.t[k], u, 1);
+        error = worst(error, e * c->residual_t);
     }
     double *defect = s->rest.z;
     crm_island_defect(s, x, defect);

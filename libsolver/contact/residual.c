@@ -89,6 +89,14 @@ static double motion_error(const carom_contact_problem *p, const carom_contact_s
     return error;
 }
 
+double crm_friction_error(double bound, double lt, double u, double w)
+{
+    const double t = lt - u / w;
+    if (t > bound) return w * fabs(lt - bound);
+    if (t < -bound) return w * fabs(lt + bound);
+    return isnan(t) ? t : fabs(u);
+}
+
 static double contact_error(const carom_contact_problem *p, const carom_contact_solution *x, int k)
 {
     const int *body = p->contact_body + 2 * k;
@@ -101,9 +109,7 @@ static double contact_error(const carom_contact_problem *p, const carom_contact_
     const double wt = crm_row_weight(jt, body, p->inv_mass);
     if (!(wt > 0)) return error; /* nothing that l_t does can be felt */
     const double u = crm_row_times(jt, body, x->v) + (p->ct ? p->ct[k] : 0);
-    const double bound = p->mu[k] * fmax(x->ln[k], 0);
-    const double t = x->lt[k] - u / wt;
-    return worst(error, fabs(wt * (x->lt[k] - fmax(-bound, fmin(bound, t)))));
+    return worst(error, crm_friction_error(p->mu[k] * fmax(x->ln[k], 0), x->lt[k], u, wt));
 }
 
 double crm_contact_residual(const carom_contact_problem *p, const carom_contact_solution *x,

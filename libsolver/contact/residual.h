@@ -43,6 +43,9 @@ static inline double crm_row_weight(const double *row, const int *body, const do
     return s;
 }
 
+/* w |l_t - clip(l_t - u / w, -bound, bound)|, without the rounding of l_t where it sticks. */
+double crm_friction_error(double bound, double lt, double u, double w);
+
 /* max(|J u|, |c|, floor |J| |u|) of one row [m/s]. */
 double crm_row_speed(const double *row, const int *body, const double *u, double c);
 

@@ -1,5 +1,6 @@
 #include "libsolver/contact/system.h"
 
+#include "libsolver/contact/ladder.h"
 #include "libsolver/contact/residual.h"
 
 #include <float.h>
@@ -281,6 +282,10 @@ void crm_system_write(const crm_system *y, const crm_graph *g, const carom_conta
         x->ln[c] = y->scale_n[slot] * speed * s->best.n[k];
         x->lt[c] = s->contact[k].mu > 0 ? y->scale_t[slot] * speed * s->best.t[k] : 0;
         x->mode[c] = s->best_mode[k];
+        /* On the border of the cone to the last bit: large impulses round coarsely. */
+        const double sign = crm_slip_sign(x->mode[c]);
+        if (sign != 0 && s->best.t[k] == sign * s->contact[k].mu * s->best.n[k])
+            x->lt[c] = sign * p->mu[c] * x->ln[c];
     }
     for (int q = 0; q < s->ng; q++) {
         const int slot = g->group_ptr[island] + q;
