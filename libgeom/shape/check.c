@@ -9,7 +9,7 @@
 /* Lengths below this are zero [1], times the extent [m]; areas, times its square. */
 static const double SHAPE_TOL = 1e-12;
 
-/* Lengths whose squares and fourth powers stay far from overflow and underflow... */
+/* Lengths whose squares and fourth powers stay far from overflow and underflow. */
 static const double SIZE_MAX_M = 1e100;
 static const double SIZE_MIN_M = 1e-100;
 
@@ -66,8 +66,8 @@ static carom_shape_error check_numbers(const carom_shape *s)
         if (!is_finite(v.x) || !is_finite(v.y)) return fault(CAROM_SHAPE_NOT_FINITE, i);
         if (!(fmax(fabs(v.x), fabs(v.y)) <= SIZE_MAX_M)) return fault(CAROM_SHAPE_SIZE, i);
     }
-    const double least = s->radius > 0 ? s->radius : SIZE_MIN_M;
-    if (!(s->radius <= SIZE_MAX_M && least >= SIZE_MIN_M)) return fault(CAROM_SHAPE_SIZE, -1);
+    const int too_small = s->radius > 0 && s->radius < SIZE_MIN_M;
+    if (too_small || s->radius > SIZE_MAX_M) return fault(CAROM_SHAPE_SIZE, -1);
     return valid();
 }
 

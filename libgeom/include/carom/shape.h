@@ -47,6 +47,16 @@ CAROM_API carom_status carom_shape_check(const carom_shape *shape, carom_shape_e
  * two", cut to size and always terminated. */
 CAROM_API void carom_shape_error_text(carom_shape_error error, char *text, size_t size);
 
+/* Convex hull of points[n], n >= 1: writes to index[n] the indices of its vertices,
+ * counterclockwise from the leftmost (of these the lowest) point, and their number to *count.
+ * Points within 4e-12 of the extent of the line through their neighbors are left out, so the hull
+ * passes carom_shape_check when *count >= 3; 2: all points are on a line, 1: at one place.  Of
+ * equal points one is taken.  With v[i] = points[index[i]] the reverse derivative is
+ * points_bar[index[i]] += v_bar[i]. CAROM_E_ARGUMENT: a coordinate is not finite or exceeds 1e100.
+ */
+CAROM_API carom_status carom_hull_from_points(int n, const carom_vec2 *points, int *index,
+                                              int *count);
+
 typedef struct carom_mass_properties {
     double area;         /* [m^2]; 0 for a segment without radius */
     carom_vec2 centroid; /* body frame [m]; of a segment without radius its middle */
