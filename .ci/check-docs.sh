@@ -1,6 +1,6 @@
 #!/bin/sh
-# check-docs.sh: the programs in README.md are the files they name, links lead somewhere, and the
-# equations that the code cites exist.
+# check-docs.sh: the programs in README.md are the files they name, links lead somewhere, the index
+# lists every page, and the equations that the code cites exist.
 set -eu
 cd -- "$(dirname -- "$0")/.."
 errors=0
@@ -34,6 +34,11 @@ for page in $(find . -name '*.md' -not -path './build*' -not -path './out/*' | s
         *) [ -e "${page%/*}/$link" ] || error "$page: there is no $link" ;;
         esac
     done <"$work/links"
+done
+
+for page in docs/*.md docs/math/*.md; do
+    link=${page#docs/}
+    [ "$link" = README.md ] || grep -qF "]($link)" docs/README.md || error "docs/README.md does not list $link"
 done
 
 grep -rhoE --include='*.[ch]' --include='*.py' '(equations\.md|EQUATIONS) \([0-9]+\)' \
