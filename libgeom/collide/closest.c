@@ -38,8 +38,9 @@ static int walk_clear(const crm_placed *a, const crm_placed *b, crm_axis x, doub
                       crm_closest *out)
 {
     const double h = axis_height(a, b, x);
-    if (!(h > 0)) return 0;
     const double length = crm_length(x.d);
+    /* h > 0 by rounding alone is no certificate: from there a walk may end anywhere. */
+    if (!(h > crm_noise(a, x.a, b, x.b) * length)) return 0;
     if (h > reach * length) {
         const crm_closest far = {CRM_APART, x.a, x.b, 0, h / length};
         *out = far;

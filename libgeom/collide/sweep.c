@@ -20,6 +20,10 @@ static double extent_of(const crm_placed *p)
     return fmax(fmax(high.x - low.x, high.y - low.y), p->radius);
 }
 
+/* Corners that turn less than 84 degrees are blunt: squared cosine.  At 90 degrees a rounding of the
+ * normal decides whether an edge of the other core lies flat at the top. */
+static const double BLUNT = 0.01;
+
 typedef struct best_face {
     double height;
     double second; /* of the other faces, A's and B's */
@@ -64,7 +68,8 @@ static int sweep_faces(const crm_placed *p, const crm_placed *q, int on_b, doubl
     for (int k = 0; p->n > 1 && k < p->n; k++) {
         const carom_vec2 u = crm_normal(p, k);
         /* Past a sharp corner the climb would start near the top, where it could stall. */
-        if (crm_dot(before, u) > 0) {
+        const double turn = crm_dot(before, u);
+        if (turn > 0 && turn * turn > BLUNT * crm_dot(before, before) * crm_dot(u, u)) {
             j = climb(q, crm_turn_back(q, u), j);
         } else {
             j = crm_support(q, crm_neg(u));
