@@ -3,7 +3,7 @@
 #include <math.h>
 
 /* Compliance of an active row in unit scale: the proximal term [1]. */
-#define PROXIMAL 1e-9
+#define PROXIMAL 1e-10
 /* Passes stop when the defect is below this [1] ... */
 #define DEFECT_DONE 1e-15
 /* ... or, below this, no longer halves. */
@@ -11,7 +11,7 @@
 /* A mode is kept while it is violated by less, in unit scale [1]. */
 #define KEEP 1e-11
 /* Passes of one solve. */
-#define PASSES 6
+#define PASSES 12
 
 enum { MAX_ROUNDS = 32 };
 
@@ -43,11 +43,22 @@ void crm_set_responses(crm_island *s, double compliance)
     }
 }
 
+/* Defects of the motion that are rounding of their own terms become zero: another pass would only
+ * turn them into new ones, and disturb the rows. */
+static void drop_rounding(crm_island *s)
+{
+    crm_island_term_sizes(s, s->x, s->size);
+    for (int i = 0; i < 3 * s->nb; i++) {
+        if (fabs(s->rhs.z[i]) <= CRM_ROUNDING * s->size[i]) s->rhs.z[i] = 0;
+    }
+}
+
 /* What is left of the equations at s->x, into s->rhs; returns its largest entry. */
-static double find_defect(crm_island *s)
+static double find_defect(crm_island *s, int settle)
 {
     double e = 0;
     crm_island_defect(s, s->x, s->rhs.z);
+    if (settle) drop_rounding(s);
     for (int i = 0; i < 3 * (s->nb + s->ng); i++) e = fmax(e, fabs(s->rhs.z[i]));
     for (int k = 0; k < s->nc; k++) {
         const crm_contact *c = &s->contact[k];
@@ -71,9 +82,16 @@ void crm_solve_modes(crm_island *s, int passes)
     crm_set_responses(s, PROXIMAL);
     crm_island_factor(s, 1, PROXIMAL);
     double last = HUGE_VAL;
+    int settle = 0;
     for (int i = 0; i < passes; i++) {
-        const double e = find_defect(s);
-        if (e < DEFECT_DONE || (e >= 0.5 * last && e < DEFECT_SMALL)) break;
+        double e = find_defect(s, settle);
+        if (e >= 0.5 * last && !settle) {
+            settle = 1;
+            e = find_defect(s, settle);
+        } else if (e >= 0.5 * last && e < DEFECT_SMALL) {
+            break;
+        }
+        if (e < DEFECT_DONE) break;
         last = fmin(e, last);
         crm_island_reduce(s, s->rhs, s->step);
         crm_vec_add(s, s->x, 1, s->step);
