@@ -12,12 +12,17 @@
 /* Each number against central differences, relative to the largest entry of its array and of the
  * loss: the differences themselves are good to about 1e-8 on these runs. */
 static const double DIFFERENCE_TOL = 1e-6;
-static const double STEP = 2e-5;
+#define STEP 2e-5
+/* Two faces in contact are both candidates for the reference face.  Turned by d against each other
+ * their separations differ by d^2, which decides once it is above the tie tolerance of 1e-14: the
+ * normal then jumps by d.  Differences have to stay below. */
+#define STEP_OF_FACES 1e-7
 
 typedef struct scene {
     const char *name;
     carom_world *(*build)(void);
     int n_steps;
+    double step; /* of the differences */
 } scene;
 
 /* --- scenes ----------------------------------------------------------------------------------- */
@@ -109,8 +114,16 @@ static carom_world *pushed_stack(void)
 {
     carom_world *w = scene_world(9.81, 1.0 / 60);
     scene_floor(w, 0.4, 0);
-    for (int k = 0; k < 4; k++) scene_box(w, 1 + k, 0.5, 0.25, at(0, 0.25 + 0.5 * k, 0), 0.4, 0);
-    scene_push(w, 2, 0, 1.5, 0);
+    /* Each box within the one below: where flush faces overhang, the reference face depends on
+     * the sign of a turn.  Each with its own friction and speed: a box that gains mu g h in one
+     * step and loses it in the next is at the border of sticking.  All of that are kinks. */
+    static const double aside[4] = {0, 0.03, 0.02, 0.05};
+    static const double speed[4] = {1, 1.6, 1.25, 2.1};
+    for (int k = 0; k < 4; k++) {
+        scene_box(w, 1 + k, 0.5 - 0.06 * k, 0.25, at(aside[k], 0.25 + 0.5 * k, 0), 0.5 - 0.07 * k,
+                  0);
+    }
+    for (int k = 0; k < 4; k++) scene_push(w, 1 + k, 0, speed[k], 0);
     sink(w, 1e-5);
     return w;
 }
@@ -179,12 +192,17 @@ static carom_world *kinematic_belt(void)
 }
 
 static const scene SCENES[] = {
-    {"sliding box", sliding_box, 30},      {"slide to roll", slide_to_roll, 60},
-    {"oblique stick", oblique_stick, 30},  {"oblique slip", oblique_slip, 30},
-    {"two discs", two_discs, 40},          {"chain of ten", chain, 15},
-    {"pushed stack", pushed_stack, 20},    {"tumbling box", tumbling_box, 30},
-    {"double pendulum", pendulum, 40},     {"rounded hull on slope", rounded_on_slope, 40},
-    {"box on a belt", kinematic_belt, 20},
+    {"sliding box", sliding_box, 30, STEP},
+    {"slide to roll", slide_to_roll, 60, STEP},
+    {"oblique stick", oblique_stick, 30, STEP},
+    {"oblique slip", oblique_slip, 30, STEP},
+    {"two discs", two_discs, 40, STEP},
+    {"chain of ten", chain, 15, STEP},
+    {"pushed stack", pushed_stack, 20, STEP_OF_FACES},
+    {"tumbling box", tumbling_box, 30, STEP},
+    {"double pendulum", pendulum, 40, STEP},
+    {"rounded hull on slope", rounded_on_slope, 40, STEP},
+    {"box on a belt", kinematic_belt, 20, STEP},
 };
 enum { N_SCENES = sizeof SCENES / sizeof SCENES[0] };
 
@@ -352,9 +370,9 @@ static void check_array(run *r, const carom_world *w, const whole *x, int a)
             continue;
         }
         r->entry = k;
-        double best = fdiff(loss, r, STEP, &error);
+        double best = fdiff(loss, r, r->s->step, &error);
         if (fabs(best - x->array[a][k]) > DIFFERENCE_TOL * largest) {
-            best = fdiff(loss, r, STEP / 16, &error);
+            best = fdiff(loss, r, r->s->step / 16, &error);
         }
         if (fabs(best - x->array[a][k]) > DIFFERENCE_TOL * largest) {
             fail_msg("%s: d/d %s[%d] = %.12g, differences %.12g (+- %.2g), largest %.3g",

@@ -318,7 +318,10 @@ static void collision_balances(void **state)
         balances(w, mass, inertia, before);
         scene_run(w, 60, NULL);
         balances(w, mass, inertia, after);
-        for (int i = 0; i < 3; i++) assert_near_case(cases[k].name, i, after[i], before[i], EXACT);
+        assert_near_case(cases[k].name, 0, after[0], before[0], EXACT);
+        assert_near_case(cases[k].name, 1, after[1], before[1], EXACT);
+        /* a correction moves bodies in contact without touching their velocities: sum m d x v */
+        assert_near_case(cases[k].name, 2, after[2], before[2], cases[k].e > 0 ? EXACT : 1e-4);
         if (cases[k].keeps_energy) {
             assert_near_case(cases[k].name, 3, after[3], before[3], EXACT);
         } else {
