@@ -252,7 +252,9 @@ carom_status crm_guess_save(carom_world *w);
 /* Corrects sub.q1 until no contact of sub overlaps and no joint drifts. */
 carom_status crm_project(carom_world *w, crm_substep *s);
 
-/* locate.c: runs S on (0, left]; when a contact outside sub.contacts closes on the way, ends at the
+/* locate.c: S(left), or S of a fraction of it when that has no solution. */
+carom_status crm_run_through(carom_world *w, double left);
+/* Runs S on (0, left]; when a contact outside sub.contacts closes on the way, ends at the
  * first such event. */
 carom_status crm_locate(carom_world *w, double left);
 

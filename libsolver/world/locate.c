@@ -259,13 +259,18 @@ static carom_status halve(carom_world *w, double left, carom_status failed)
     return failed;
 }
 
+carom_status crm_run_through(carom_world *w, double left)
+{
+    w->sub.end = CRM_END_FRAME;
+    const carom_status e = crm_euler(w, left);
+    return e == CAROM_E_NO_SOLUTION || e == CAROM_E_INFEASIBLE ? halve(w, left, e) : e;
+}
+
 carom_status crm_locate(carom_world *w, double left)
 {
     crm_substep *s = &w->sub;
-    s->end = CRM_END_FRAME;
-    carom_status e = crm_euler(w, left);
-    if (e == CAROM_E_NO_SOLUTION || e == CAROM_E_INFEASIBLE) return halve(w, left, e);
-    if (e < 0) return e;
+    carom_status e = crm_run_through(w, left);
+    if (e < 0 || s->end != CRM_END_FRAME) return e;
     watch x;
     int any;
     e = first_closed(w, &x, &any);

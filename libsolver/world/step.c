@@ -5,6 +5,8 @@
 
 /* Time below this fraction of a step is carried into the next one. */
 static const double CARRY_TOL = 1e-13;
+/* Moving bodies times sub-steps in one step, and sub-steps beyond all counting. */
+enum { BODY_SUBSTEPS = 512, MAX_SUBSTEPS = 256 };
 
 static void begin_substep(carom_world *w)
 {
@@ -48,19 +50,23 @@ static carom_status commit(carom_world *w)
     return CAROM_OK;
 }
 
+/* Sub-steps of one step: every impact costs solves of the whole world, so large worlds get fewer.
+ */
+static int substeps_allowed(const carom_world *w)
+{
+    int n = w->n_moving > 0 ? BODY_SUBSTEPS / w->n_moving : BODY_SUBSTEPS;
+    if (n < 2) n = 2;
+    return n < w->settings.max_substeps ? n : w->settings.max_substeps;
+}
+
 static carom_status substep(carom_world *w, double *left)
 {
-    const int last = w->stats->n_substeps + 1 >= w->settings.max_substeps;
+    const int last = w->stats->n_substeps + 1 >= substeps_allowed(w);
     begin_substep(w);
     carom_status e = find_contacts(w, *left, last);
     if (e < 0) return e;
     crm_guess_load(w);
-    if (last) {
-        w->sub.end = CRM_END_FRAME;
-        e = crm_euler(w, *left);
-    } else {
-        e = crm_locate(w, *left);
-    }
+    e = last ? crm_run_through(w, *left) : crm_locate(w, *left);
     if (e < 0) return e;
     if (e > w->stats->status) w->stats->status = e;
     *left = w->sub.end == CRM_END_FRAME ? 0 : *left - w->sub.h;
@@ -73,6 +79,7 @@ static carom_status advance(carom_world *w)
     double left = dt + w->carry;
     w->carry = 0;
     while (left > CARRY_TOL * dt) {
+        if (w->stats->n_substeps >= MAX_SUBSTEPS) return CAROM_E_NO_SOLUTION;
         const carom_status e = substep(w, &left);
         if (e < 0) return e;
     }
