@@ -154,7 +154,8 @@ void crm_body_read(crm_problems *problems, const crm_node *node, crm_scene_body 
     crm_get_text(problems, &name, &body->name);
     if (type.json) {
         const int word = crm_get_word(problems, &type, type_words);
-        if (word >= 0) body->def.type = (carom_body_type)word;
+        /* a kinematic body asks for nothing more: one fault is enough */
+        body->def.type = word >= 0 ? (carom_body_type)word : CAROM_KINEMATIC;
     }
     read_motion(problems, node, &body->def);
     read_material(problems, node, &body->def);
