@@ -254,7 +254,7 @@ static int modes_valid(const carom_contact_problem *p, const unsigned char *mode
 /* 9 per body, 2 per contact, 1 per joint row. */
 static carom_status reserve_scratch(carom_contact_solver *c, const carom_contact_problem *p)
 {
-    const int n = 9 * p->n_bodies + 2 * p->n_contacts + p->n_joint_rows;
+    const int n = 9 * p->n_bodies + 2 * p->n_contacts + p->n_joint_rows + 1;
     return crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, n, sizeof(double));
 }
 

@@ -204,7 +204,7 @@ static carom_status solve(carom_contact_solver *c, const carom_contact_problem *
 {
     carom_status s = crm_contact_check(p);
     if (s < 0) return s;
-    s = crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, 6 * p->n_bodies,
+    s = crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, 6 * p->n_bodies + 1,
                     sizeof(double));
     if (s >= 0) s = crm_solver_prepare(c, p);
     if (s >= 0) s = check_prescribed(c, p);
