@@ -99,11 +99,35 @@ static char *read_file(crm_problems *problems, size_t *length)
     return text;
 }
 
-json_t *crm_json_load(crm_problems *problems)
+/* Overwrites the word, wherever it stands outside of texts, by "" and blanks: what comes after it
+ * keeps its line and column. */
+static void blank_word(char *text, const char *word)
+{
+    const size_t n = strlen(word);
+    int in_text = 0;
+    for (char *c = text; *c; c++) {
+        if (in_text && c[0] == '\\' && c[1]) {
+            c++;
+        } else if (*c == '"') {
+            in_text = !in_text;
+        } else if (!in_text && strncmp(c, word, n) == 0) {
+            memset(c, ' ', n);
+            c[0] = c[1] = '"';
+            c++;
+        }
+    }
+}
+
+static json_t *load(crm_problems *problems, int of_python)
 {
     size_t length = 0;
     char *text = read_file(problems, &length);
     if (!text) return NULL;
+    if (of_python) {
+        blank_word(text, "-Infinity");
+        blank_word(text, "Infinity");
+        blank_word(text, "NaN");
+    }
     json_error_t error;
     json_t *json = json_loadb(text, length, 0, &error);
     if (!json) {
@@ -116,6 +140,16 @@ json_t *crm_json_load(crm_problems *problems)
     }
     free(text);
     return json;
+}
+
+json_t *crm_json_load(crm_problems *problems)
+{
+    return load(problems, 0);
+}
+
+json_t *crm_json_load_python(crm_problems *problems)
+{
+    return load(problems, 1);
 }
 
 crm_node crm_root(const json_t *json)

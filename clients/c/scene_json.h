@@ -39,6 +39,8 @@ void crm_node_place(const crm_node *node, char *text, size_t size);
 /* The file's whole text, parsed; NULL with the fault noted.  "-" reads standard input.  Duplicate
  * keys are faults with their place; syntax errors carry line and column. */
 json_t *crm_json_load(crm_problems *problems);
+/* The same for files that Python wrote: NaN and Infinity, which JSON has not, read as "". */
+json_t *crm_json_load_python(crm_problems *problems);
 
 crm_node crm_root(const json_t *json);
 /* The member of an object, the item of an array; json NULL when there is none. */

@@ -31,14 +31,25 @@ static void print_usage(FILE *f)
           f);
 }
 
+/* The default as it is written in a file: the first word of the text where only words are taken. */
+static void print_setting(const char *name, double value, const char *unit, const char *text)
+{
+    carom_world_settings probe = carom_world_defaults();
+    char preset[32];
+    snprintf(preset, sizeof preset, "%.6g", value);
+    if (carom_world_settings_set(&probe, name, preset, NULL) < 0) {
+        snprintf(preset, sizeof preset, "%.*s", (int)strcspn(text, ", "), text);
+    }
+    printf("  %-20s %-10s %-11s %s\n", name, preset, unit[0] ? unit : "-", text);
+}
+
 static void print_settings(void)
 {
     printf("Settings of a scene, by name: in \"settings\" of the file, or --set NAME=VALUE.\n\n");
-#define ROW(name, type, value, unit, text)                                                         \
-    printf("  %-20s %-12.6g %-11s %s\n", #name, (double)(value), unit[0] ? unit : "-", text);
+    printf("  %-20s %-10s %-11s %s\n", "name", "default", "unit", "meaning");
+#define ROW(name, type, value, unit, text) print_setting(#name, (double)(value), unit, text);
     CAROM_WORLD_SETTINGS(ROW)
 #undef ROW
-    printf("\nChoices are given by their word; the table shows the first as 0.\n");
 }
 
 static int help(int argc, char **argv)

@@ -116,7 +116,10 @@ static void put_entry(crm_output *out, const crm_gradient *g, const crm_check_en
     crm_put_numbers(out, CRM_CHECK_STEPS, e->step);
     crm_put_key(out, 0, "differences");
     crm_put_numbers(out, CRM_CHECK_STEPS, e->difference);
+    crm_put_key(out, 0, "sides");
+    crm_put_numbers(out, 2, e->side);
     crm_put_field(out, 0, "disagreement", e->disagreement);
+    if (e->kink) crm_put_raw(out, ",\"kink\":true");
     if (e->one_sided) crm_put_raw(out, ",\"one_sided\":true");
     crm_put_raw(out, "}");
 }
@@ -165,11 +168,15 @@ static void print_check(const crm_check *c)
         const crm_wrt array = c->entries[i].array;
         int worst = i;
         int n = 0;
+        int kinks = 0;
         for (; i < c->count && c->entries[i].array == array; i++, n++) {
+            kinks += c->entries[i].kink;
             if (c->entries[i].disagreement > c->entries[worst].disagreement) worst = i;
         }
-        fprintf(stderr, "check %-12s %3d entries, largest disagreement %.2e at [%d]\n",
-                crm_wrt_names[array], n, c->entries[worst].disagreement, c->entries[worst].index);
+        fprintf(stderr,
+                "check %-12s %3d entries, largest disagreement %.2e at [%d], %d at a kink\n",
+                crm_wrt_names[array], n, c->entries[worst].disagreement, c->entries[worst].index,
+                kinks);
     }
     if (c->interrupted) fputs("check interrupted; the entries above were checked\n", stderr);
 }

@@ -30,47 +30,52 @@ static const char *stage_word(carom_contact_stage stage)
     return "unknown";
 }
 
-static void put_solution(crm_output *out, const crm_lcp *lcp, carom_status status,
-                         const carom_contact_stats *stats, double seconds)
+static void put_solution(crm_output *out, const crm_lcp *lcp, const carom_contact_solution *x,
+                         const carom_contact_stats *stats, const char *stage, double seconds)
 {
-    const carom_contact_problem *p = &lcp->problem;
-    const carom_contact_solution *x = &lcp->solution;
     crm_put_raw(out, "{\"name\":");
     crm_put_text(out, lcp->name);
     crm_put_key(out, 0, "status");
-    crm_put_text(out, status_word(status));
+    crm_put_text(out, status_word(stats->status));
     crm_put_field(out, 0, "residual", stats->residual);
     crm_put_key(out, 0, "v");
-    crm_put_numbers(out, 3 * p->n_bodies, x->v);
+    crm_put_numbers(out, 3 * lcp->n_bodies, x->v);
     crm_put_key(out, 0, "lam_n");
-    crm_put_numbers(out, p->n_contacts, x->ln);
+    crm_put_numbers(out, lcp->n_contacts, x->ln);
     crm_put_key(out, 0, "lam_t");
-    crm_put_numbers(out, p->n_contacts, x->lt);
+    crm_put_numbers(out, lcp->n_contacts, x->lt);
     crm_put_key(out, 0, "lam_e");
-    crm_put_numbers(out, p->n_joint_rows, x->le);
+    crm_put_numbers(out, lcp->n_joint_rows, x->le);
     crm_put_field(out, 0, "factorizations", stats->factorizations);
     crm_put_key(out, 0, "stage");
-    crm_put_text(out, stage_word(stats->stage));
+    crm_put_text(out, stage);
     crm_put_field(out, 0, "seconds", seconds);
     crm_put_raw(out, "}\n");
+}
+
+static int solve_problem(const crm_lcp *lcp, carom_contact_solver *solver, const char *file,
+                         crm_output *out)
+{
+    carom_contact_solution x = crm_lcp_room(lcp);
+    carom_contact_stats stats;
+    double seconds = 0;
+    memset(&stats, 0, sizeof stats);
+    const int fits = crm_lcp_contact(lcp, solver, &x, &stats, &seconds);
+    if (!fits) crm_lcp_general(lcp, &x, &stats, &seconds);
+    put_solution(out, lcp, &x, &stats, fits ? stage_word(stats.stage) : "general", seconds);
+    crm_lcp_room_free(&x);
+    if (stats.status >= 0 || stats.status == CAROM_E_INFEASIBLE) return CRM_DONE;
+    fprintf(stderr, "%s: %s: %s\n", file, carom_status_name(stats.status),
+            carom_status_text(stats.status));
+    return CRM_FAILED;
 }
 
 static int solve_file(const char *file, carom_contact_solver *solver, crm_output *out)
 {
     crm_problems problems = {file, 0, NULL};
     crm_lcp lcp;
-    carom_contact_stats stats;
     int code = CRM_USAGE;
-    if (crm_lcp_read(&problems, &lcp)) {
-        memset(&stats, 0, sizeof stats);
-        const double start = crm_clock();
-        const carom_status s = carom_contact_solve(solver, &lcp.problem, 0, &lcp.solution, &stats);
-        put_solution(out, &lcp, s, &stats, crm_clock() - start);
-        code = s >= 0 || s == CAROM_E_INFEASIBLE ? CRM_DONE : CRM_FAILED;
-        if (code == CRM_FAILED) {
-            fprintf(stderr, "%s: %s: %s\n", file, carom_status_name(s), carom_status_text(s));
-        }
-    }
+    if (crm_lcp_read(&problems, &lcp)) code = solve_problem(&lcp, solver, file, out);
     crm_print_problems(&problems);
     crm_problems_free(&problems);
     crm_lcp_free(&lcp);
@@ -122,7 +127,8 @@ const crm_command crm_command_lcp = {
     "solves contact problems, one JSON line each",
     "PROBLEM: {\"name\", \"M\", \"J_c\", \"J_t\", \"J_e\", \"mu\", \"c\", \"q\"}, convention\n"
     "M v - J_c' lam_n - J_t' lam_t - J_e' lam_e + q = 0; status is solved, inexact, infeasible or\n"
-    "failed.  Exit code 2 when one of them failed.\n",
+    "failed.  Rows that touch more than two bodies go to the general solver (stage general).\n"
+    "Exit code 2 when one of the problems failed.\n",
     options,
     1,
     INT_MAX,

@@ -12,6 +12,10 @@
 /* Relative step sizes: a truncation error of h^2 against a rounding error of eps/h. */
 static const double relative_step[CRM_CHECK_STEPS] = {1e-5, 1e-6};
 
+/* Sides that differ by more than this, relative, belong to a kink; their own error is of first
+ * order in the step. */
+#define KINK_TOL 1e-3
+
 typedef struct checker {
     const crm_gradient *g;
     const crm_run *run;
@@ -131,16 +135,23 @@ static double perturbed_loss(checker *c, crm_wrt array, int index, double delta)
     return s < 0 ? NAN : loss;
 }
 
-/* Difference quotient of second order: side 0 central, +1 or -1 into that side only. */
-static double difference(checker *c, crm_wrt array, int index, double h, int side)
+/* Difference quotients with step h.  side 0: the central one, and those of both sides; +1 or -1: of
+ * second order into that side only. */
+static double difference(checker *c, const crm_check_entry *e, double h, int side, double *sides)
 {
+    const double here = c->g->loss;
     if (side == 0) {
-        return (perturbed_loss(c, array, index, h) - perturbed_loss(c, array, index, -h)) / (2 * h);
+        const double right = perturbed_loss(c, e->array, e->index, h);
+        const double left = perturbed_loss(c, e->array, e->index, -h);
+        sides[0] = (here - left) / h;
+        sides[1] = (right - here) / h;
+        return (right - left) / (2 * h);
     }
     const double k = side * h;
-    return (4 * perturbed_loss(c, array, index, k) - perturbed_loss(c, array, index, 2 * k) -
-            3 * perturbed_loss(c, array, index, 0)) /
-           (2 * k);
+    const double once = perturbed_loss(c, e->array, e->index, k);
+    const double twice = perturbed_loss(c, e->array, e->index, 2 * k);
+    sides[0] = sides[1] = (once - here) / k;
+    return (4 * once - twice - 3 * here) / (2 * k);
 }
 
 /* The size that a relative step of this entry refers to. */
@@ -207,10 +218,19 @@ static double array_largest(const crm_gradient *g, crm_wrt array)
     return m;
 }
 
+/* The sides differ by more than rounding and truncation explain, and one of them is the gradient.
+ */
+static int is_kink(const crm_check_entry *e, double g, double scale)
+{
+    const double left = fabs(g - e->side[0]);
+    const double right = fabs(g - e->side[1]);
+    return fabs(e->side[0] - e->side[1]) > KINK_TOL * scale && fmin(left, right) < KINK_TOL * scale;
+}
+
 static void check_entry(checker *c, crm_check_entry *e)
 {
     const double g = c->g->x[e->array][e->index];
-    const double floor =
+    const double least =
         fmax(1e-3 * array_largest(c->g, e->array), 1e-4 * fmax(1, fabs(c->g->loss)));
     const double scale = entry_scale(c, e->array, e->index);
     e->disagreement = HUGE_VAL;
@@ -218,11 +238,12 @@ static void check_entry(checker *c, crm_check_entry *e)
         e->step[k] = relative_step[k] * scale;
         const int side = entry_side(c, e->array, e->index, e->step[k]);
         e->one_sided |= side != 0;
-        e->difference[k] = difference(c, e->array, e->index, e->step[k], side);
+        e->difference[k] = difference(c, e, e->step[k], side, e->side);
         const double d = fabs(g - e->difference[k]);
-        const double relative = d / fmax(fmax(fabs(g), fabs(e->difference[k])), floor);
+        const double relative = d / fmax(fmax(fabs(g), fabs(e->difference[k])), least);
         if (relative < e->disagreement) e->disagreement = relative;
     }
+    e->kink = is_kink(e, g, fmax(fabs(g), least));
 }
 
 static uint64_t next_random(uint64_t *state)

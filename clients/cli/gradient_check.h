@@ -11,8 +11,10 @@ typedef struct crm_check_entry {
     int index;
     double step[CRM_CHECK_STEPS];
     double difference[CRM_CHECK_STEPS]; /* NaN where a run failed */
-    double disagreement;                /* the smaller of the two, relative: see crm_check_run */
-    int one_sided; /* the parameter is at a bound: second-order one-sided differences */
+    double side[2];      /* left and right quotient of the smaller step; of first order */
+    double disagreement; /* the smaller of the two, relative: see crm_check_run */
+    int one_sided;       /* the parameter is at a bound: second-order one-sided differences */
+    int kink;            /* the sides differ, and the gradient is that of one of them */
 } crm_check_entry;
 
 typedef struct crm_check {

@@ -1,196 +1,148 @@
 #include "lcp_file.h"
 
 #include <limits.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Arrays of a problem under construction. */
-typedef struct build {
-    crm_problems *problems;
-    int n_bodies;
-    int n_contacts;
-    int n_joint_rows;
-    double *inv_mass, *u, *jn, *jt, *mu, *cn, *je;
-    int *contact_body, *joint_body;
-} build;
-
-static int read_array(crm_problems *problems, const crm_node *root, const char *key, int n,
-                      double *x)
+static double *read_array(crm_problems *problems, const crm_node *root, const char *key, int n)
 {
     const crm_node at = crm_member(root, key);
+    double *x = crm_resize(NULL, (size_t)n, sizeof *x);
     if (!at.json) crm_fault(problems, &at, "must be given: an array of %d numbers", n);
-    return crm_get_numbers(problems, &at, n, x);
+    crm_get_numbers(problems, &at, n, x);
+    return x;
 }
 
-/* Half of row `row` (0: A, 3: B) that belongs to `body`: the one it already has, or a free one. */
-static int find_half(int *pair, int body)
+/* Entry k of the matrix `at`. */
+static void read_entry(crm_problems *problems, const crm_node *at, int k, int n_cols,
+                       crm_triplets *m)
 {
-    for (int h = 0; h < 2; h++) {
-        if (pair[h] == body) return h;
-    }
-    for (int h = 0; h < 2; h++) {
-        if (pair[h] < 0) {
-            pair[h] = body;
-            return h;
-        }
-    }
-    return -1;
+    const crm_node is = crm_member(at, "i");
+    const crm_node js = crm_member(at, "j");
+    const crm_node xs = crm_member(at, "x");
+    const crm_node i_node = crm_item(&is, k);
+    const crm_node j_node = crm_item(&js, k);
+    const crm_node x_node = crm_item(&xs, k);
+    json_int_t i = 0;
+    json_int_t j = 0;
+    crm_get_integer(problems, &i_node, 0, m->n_rows - 1, &i);
+    crm_get_integer(problems, &j_node, 0, n_cols - 1, &j);
+    crm_get_number(problems, &x_node, &m->x[k]);
+    m->i[k] = (int)i;
+    m->j[k] = (int)j;
 }
 
-/* One triplet (i, j, x) into rows of 6; entries that stand twice add up. */
-static void place_entry(build *b, const crm_node *at, json_int_t i, json_int_t j, double x,
-                        int *pair, double *rows)
+static crm_triplets read_matrix(crm_problems *problems, const crm_node *root, const char *key,
+                                int n_cols)
 {
-    const int body = (int)j / 3;
-    const int half = find_half(&pair[2 * i], body);
-    if (half < 0) {
-        crm_fault(b->problems, at, "row %d touches more than two bodies", (int)i);
-        return;
-    }
-    rows[6 * i + 3 * half + (int)j % 3] += x;
-}
-
-/* The sparse matrix `key` into rows; contacts share one pair for normal and tangent. */
-static void read_matrix(build *b, const crm_node *root, const char *key, int n_rows, int *pair,
-                        double *rows)
-{
+    crm_triplets m = {0, 0, NULL, NULL, NULL};
     const crm_node at = crm_member(root, key);
+    const crm_node rows = crm_member(&at, "rows");
     const crm_node is = crm_member(&at, "i");
     const crm_node js = crm_member(&at, "j");
     const crm_node xs = crm_member(&at, "x");
+    json_int_t n_rows = 0;
+    if (!rows.json) crm_fault(problems, &rows, "must be given: number of rows");
+    if (!crm_get_integer(problems, &rows, 0, INT_MAX / 8, &n_rows)) return m;
     const int n = crm_length(&is);
     if (crm_length(&js) != n || crm_length(&xs) != n) {
-        crm_fault(b->problems, &at, "i, j and x must have the same length");
-        return;
+        crm_fault(problems, &at, "i, j and x must have the same length");
+        return m;
     }
-    for (int k = 0; k < n; k++) {
-        const crm_node i_node = crm_item(&is, k);
-        const crm_node j_node = crm_item(&js, k);
-        const crm_node x_node = crm_item(&xs, k);
-        json_int_t i = 0;
-        json_int_t j = 0;
-        double x = 0;
-        if (crm_get_integer(b->problems, &i_node, 0, n_rows - 1, &i) &&
-            crm_get_integer(b->problems, &j_node, 0, 3.0 * b->n_bodies - 1, &j) &&
-            crm_get_number(b->problems, &x_node, &x)) {
-            place_entry(b, &at, i, j, x, pair, rows);
-        }
+    m.n_rows = (int)n_rows;
+    m.count = n;
+    m.i = crm_resize(NULL, (size_t)n, sizeof *m.i);
+    m.j = crm_resize(NULL, (size_t)n, sizeof *m.j);
+    m.x = crm_resize(NULL, (size_t)n, sizeof *m.x);
+    memset(m.x, 0, (size_t)n * sizeof *m.x);
+    for (int k = 0; k < n; k++) read_entry(problems, &at, k, n_cols, &m);
+    return m;
+}
+
+static void check_numbers(crm_problems *problems, const crm_lcp *p)
+{
+    for (int k = 0; k < 3 * p->n_bodies; k++) {
+        if (p->mass[k] > 0) continue;
+        crm_fault(problems, NULL, "M[%d]: must be > 0, is %.17g", k, p->mass[k]);
+        break;
     }
-}
-
-static int matrix_rows(crm_problems *problems, const crm_node *root, const char *key)
-{
-    json_int_t rows = 0;
-    const crm_node at = crm_member(root, key);
-    const crm_node n = crm_member(&at, "rows");
-    if (!n.json) crm_fault(problems, &n, "must be given: number of rows");
-    return crm_get_integer(problems, &n, 0, INT_MAX / 6, &rows) ? (int)rows : 0;
-}
-
-/* All arrays from one block each of numbers and of indices. */
-static void allocate(build *b, crm_lcp *lcp)
-{
-    const size_t nb = (size_t)b->n_bodies;
-    const size_t nc = (size_t)b->n_contacts;
-    const size_t ne = (size_t)b->n_joint_rows;
-    const size_t n = 9 * nb + 16 * nc + 7 * ne;
-    double *p = crm_resize(NULL, n, sizeof *p);
-    memset(p, 0, n * sizeof *p);
-    lcp->numbers = p;
-    b->inv_mass = p;
-    b->u = b->inv_mass + 3 * nb;
-    lcp->solution.v = b->u + 3 * nb;
-    b->jn = lcp->solution.v + 3 * nb;
-    b->jt = b->jn + 6 * nc;
-    b->mu = b->jt + 6 * nc;
-    b->cn = b->mu + nc;
-    lcp->solution.ln = b->cn + nc;
-    lcp->solution.lt = lcp->solution.ln + nc;
-    b->je = lcp->solution.lt + nc;
-    lcp->solution.le = b->je + 6 * ne;
-    lcp->bodies = crm_resize(NULL, 2 * (nc + ne), sizeof(int));
-    for (size_t k = 0; k < 2 * (nc + ne); k++) lcp->bodies[k] = -1;
-    b->contact_body = lcp->bodies;
-    b->joint_body = lcp->bodies + 2 * nc;
-    lcp->solution.mode = crm_resize(NULL, nc, 1);
-    memset(lcp->solution.mode, 0, nc);
-}
-
-/* inv_mass holds M and u holds q on entry. */
-static void free_motion(build *b)
-{
-    for (int i = 0; i < 3 * b->n_bodies; i++) {
-        const double m = b->inv_mass[i];
-        if (!(m > 0)) {
-            crm_fault(b->problems, NULL, "M[%d]: must be > 0, is %.17g", i, m);
-            return;
-        }
-        b->inv_mass[i] = 1 / m;
-        b->u[i] = -b->u[i] / m;
+    for (int k = 0; k < p->n_contacts; k++) {
+        if (p->mu[k] >= 0) continue;
+        crm_fault(problems, NULL, "mu[%d]: must be >= 0, is %.17g", k, p->mu[k]);
+        break;
     }
-}
-
-static void publish(const build *b, carom_contact_problem *p)
-{
-    p->n_bodies = b->n_bodies;
-    p->n_contacts = b->n_contacts;
-    p->n_joint_rows = b->n_joint_rows;
-    p->inv_mass = b->inv_mass;
-    p->u = b->u;
-    p->contact_body = b->contact_body;
-    p->jn = b->jn;
-    p->jt = b->jt;
-    p->mu = b->mu;
-    p->cn = b->cn;
-    p->joint_body = b->joint_body;
-    p->je = b->je;
-}
-
-static void read_problem(crm_problems *problems, const json_t *json, crm_lcp *lcp)
-{
-    const crm_node root = crm_root(json);
-    const crm_node mass = crm_member(&root, "M");
-    build b;
-    memset(&b, 0, sizeof b);
-    b.problems = problems;
-    b.n_bodies = crm_length(&mass) / 3;
-    b.n_contacts = matrix_rows(problems, &root, "J_c");
-    b.n_joint_rows = matrix_rows(problems, &root, "J_e");
-    if (problems->count) return;
-    allocate(&b, lcp);
-    if (!read_array(problems, &root, "M", 3 * b.n_bodies, b.inv_mass) ||
-        !read_array(problems, &root, "q", 3 * b.n_bodies, b.u) ||
-        !read_array(problems, &root, "mu", b.n_contacts, b.mu) ||
-        !read_array(problems, &root, "c", b.n_contacts, b.cn)) {
-        return;
+    if (p->jt.n_rows != p->n_contacts) {
+        crm_fault(problems, NULL, "J_t.rows: must be %d as in J_c, is %d", p->n_contacts,
+                  p->jt.n_rows);
     }
-    read_matrix(&b, &root, "J_c", b.n_contacts, b.contact_body, b.jn);
-    read_matrix(&b, &root, "J_t", b.n_contacts, b.contact_body, b.jt);
-    read_matrix(&b, &root, "J_e", b.n_joint_rows, b.joint_body, b.je);
-    free_motion(&b);
-    publish(&b, &lcp->problem);
 }
 
 int crm_lcp_read(crm_problems *problems, crm_lcp *lcp)
 {
     memset(lcp, 0, sizeof *lcp);
-    json_t *json = crm_json_load(problems);
+    json_t *json = crm_json_load_python(problems);
     if (!json) return 0;
+    const crm_node root = crm_root(json);
+    const crm_node mass = crm_member(&root, "M");
     const char *name = json_string_value(json_object_get(json, "name"));
     if (!name) name = problems->file;
     lcp->name = crm_resize(NULL, strlen(name) + 1, 1);
     strcpy(lcp->name, name);
-    read_problem(problems, json, lcp);
+    const int n = crm_length(&mass) / 3;
+    lcp->n_bodies = n;
+    lcp->jn = read_matrix(problems, &root, "J_c", 3 * n);
+    lcp->jt = read_matrix(problems, &root, "J_t", 3 * n);
+    lcp->je = read_matrix(problems, &root, "J_e", 3 * n);
+    lcp->n_contacts = lcp->jn.n_rows;
+    lcp->n_joint_rows = lcp->je.n_rows;
+    lcp->mass = read_array(problems, &root, "M", 3 * n);
+    lcp->q = read_array(problems, &root, "q", 3 * n);
+    lcp->mu = read_array(problems, &root, "mu", lcp->n_contacts);
+    lcp->c = read_array(problems, &root, "c", lcp->n_contacts);
+    if (!problems->count) check_numbers(problems, lcp);
     json_decref(json);
     return problems->count == 0;
+}
+
+static void free_triplets(crm_triplets *m)
+{
+    free(m->i);
+    free(m->j);
+    free(m->x);
 }
 
 void crm_lcp_free(crm_lcp *lcp)
 {
     free(lcp->name);
-    free(lcp->numbers);
-    free(lcp->bodies);
-    free(lcp->solution.mode);
+    free(lcp->mass);
+    free(lcp->q);
+    free(lcp->mu);
+    free(lcp->c);
+    free_triplets(&lcp->jn);
+    free_triplets(&lcp->jt);
+    free_triplets(&lcp->je);
     memset(lcp, 0, sizeof *lcp);
+}
+
+carom_contact_solution crm_lcp_room(const crm_lcp *lcp)
+{
+    const size_t n_v = 3 * (size_t)lcp->n_bodies;
+    const size_t n_c = (size_t)lcp->n_contacts;
+    const size_t n = n_v + 2 * n_c + (size_t)lcp->n_joint_rows;
+    carom_contact_solution x;
+    x.v = crm_resize(NULL, n, sizeof(double));
+    memset(x.v, 0, n * sizeof(double));
+    x.ln = x.v + n_v;
+    x.lt = x.ln + n_c;
+    x.le = x.lt + n_c;
+    x.mode = crm_resize(NULL, n_c, 1);
+    memset(x.mode, 0, n_c);
+    return x;
+}
+
+void crm_lcp_room_free(carom_contact_solution *x)
+{
+    free(x->v);
+    free(x->mode);
+    memset(x, 0, sizeof *x);
 }
