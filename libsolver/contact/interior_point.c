@@ -249,20 +249,26 @@ static void measure_products(const interior *p, const direction *d, double step,
     *mean /= p->n_products;
 }
 
-/* d's right-hand sides: target - products, minus `second` times the products of `from`'s steps. */
-static void set_target(const interior *p, direction *d, double target, double second,
-                       const direction *from)
+/* d's right-hand sides: target - products. */
+static void set_target(const interior *p, direction *d, double target)
 {
     const crm_vec x = p->s->x;
     for (int k = 0; k < p->s->nc; k++) {
         d->cn[k] = target - x.n[k] * p->a[k];
-        if (second != 0) d->cn[k] -= second * from->v.n[k] * from->a[k];
         if (!has_cone(p, k)) continue;
         d->cp[k] = target - plus(p, x, k) * p->wp[k];
         d->cm[k] = target - minus(p, x, k) * p->wm[k];
-        if (second == 0) continue;
-        d->cp[k] -= second * plus(p, from->v, k) * from->wp[k];
-        d->cm[k] -= second * minus(p, from->v, k) * from->wm[k];
+    }
+}
+
+/* Mehrotra's corrector: d's right-hand sides lose the products of the affine steps. */
+static void add_corrector(const interior *p, direction *d, const direction *affine)
+{
+    for (int k = 0; k < p->s->nc; k++) {
+        d->cn[k] -= affine->v.n[k] * affine->a[k];
+        if (!has_cone(p, k)) continue;
+        d->cp[k] -= plus(p, affine->v, k) * affine->wp[k];
+        d->cm[k] -= minus(p, affine->v, k) * affine->wm[k];
     }
 }
 
@@ -300,16 +306,17 @@ static double centering(const interior *p, const direction *affine, int short_st
 /* The direction of this iteration, in way[returned]; *step its longest step. */
 static int choose_direction(interior *p, int short_steps, double *step)
 {
-    set_target(p, &p->way[0], 0, 0, NULL);
+    set_target(p, &p->way[0], 0);
     find_direction(p, &p->way[0]);
     const double sigma = centering(p, &p->way[0], short_steps);
     const double target = sigma * p->mean;
     int now = 1;
-    set_target(p, &p->way[1], target, short_steps < 3 ? 1 : 0, &p->way[0]);
+    set_target(p, &p->way[1], target);
+    if (short_steps < 3) add_corrector(p, &p->way[1], &p->way[0]);
     find_direction(p, &p->way[1]);
     *step = longest_step(p, &p->way[1]);
     if (*step < 0.1) { /* the corrector harms: plain centered step */
-        set_target(p, &p->way[0], fmax(sigma, 0.1) * p->mean, 0, NULL);
+        set_target(p, &p->way[0], fmax(sigma, 0.1) * p->mean);
         find_direction(p, &p->way[0]);
         const double plain = longest_step(p, &p->way[0]);
         if (plain > *step) {
