@@ -180,9 +180,10 @@ static void describe(const json_t *json, char *text, size_t size)
 {
     static const char *const kinds[] = {"an object", "an array", "a text", "a number",
                                         "a number",  "true",     "false",  "null"};
-    const double x = json_number_value(json);
-    if (json_is_number(json)) {
-        snprintf(text, size, "%.17g", x);
+    if (!json) {
+        snprintf(text, size, "missing");
+    } else if (json_is_number(json)) {
+        snprintf(text, size, "%.17g", json_number_value(json));
     } else if (json_is_string(json)) {
         snprintf(text, size, "\"%.40s\"", json_string_value(json));
     } else {

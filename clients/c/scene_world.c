@@ -59,6 +59,38 @@ static carom_status add_joints(const crm_scene *scene, const crm_anchor_shift *s
     return CAROM_OK;
 }
 
+static int is_accepted(const carom_world_settings *settings)
+{
+    carom_world *w = NULL;
+    const carom_status s = carom_world_create(settings, NULL, &w);
+    carom_world_destroy(w);
+    return s != CAROM_E_ARGUMENT;
+}
+
+/* The setting that is out of its range by itself; NULL: only their combination is. */
+static const char *find_culprit(const carom_world_settings *settings)
+{
+#define TRY(name, type, value, unit, text)                                                         \
+    {                                                                                              \
+        carom_world_settings one = carom_world_defaults();                                         \
+        one.name = settings->name;                                                                 \
+        if (!is_accepted(&one)) return #name;                                                      \
+    }
+    CAROM_WORLD_SETTINGS(TRY)
+#undef TRY
+    return NULL;
+}
+
+static void explain_settings(const carom_world_settings *settings, char *why, size_t size)
+{
+    const char *culprit = find_culprit(settings);
+    if (culprit) {
+        snprintf(why, size, "settings.%s: out of its range; see `carom help settings`", culprit);
+    } else {
+        snprintf(why, size, "settings: do not fit each other; see `carom help settings`");
+    }
+}
+
 carom_status crm_scene_world(const crm_scene *scene, const crm_anchor_shift *shift,
                              carom_world **out, char *why, size_t size)
 {
@@ -67,7 +99,8 @@ carom_status crm_scene_world(const crm_scene *scene, const crm_anchor_shift *shi
     carom_world *w = NULL;
     carom_status s = carom_world_create(&scene->settings, NULL, &w);
     if (s < 0) {
-        snprintf(why, size, "settings: %s", carom_status_text(s));
+        snprintf(why, size, "%s", carom_status_text(s));
+        if (s == CAROM_E_ARGUMENT) explain_settings(&scene->settings, why, size);
         return s;
     }
     s = add_bodies(scene, w, why, size);
