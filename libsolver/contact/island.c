@@ -186,7 +186,7 @@ static void assemble_group(crm_island *s, int q, double delta)
     }
 }
 
-void crm_island_factor(crm_island *s, double shift, double delta)
+void crm_island_assemble(crm_island *s, double shift, double delta)
 {
     const crm_block_lu *f = &s->lu;
     const size_t from = 9 * (size_t)f->lp[0];
@@ -200,6 +200,11 @@ void crm_island_factor(crm_island *s, double shift, double delta)
     }
     for (int k = 0; k < s->nc; k++) assemble_contact(s, k);
     for (int q = 0; q < s->ng; q++) assemble_group(s, q, delta);
+}
+
+void crm_island_factor(crm_island *s, double shift, double delta)
+{
+    crm_island_assemble(s, shift, delta);
     crm_block_factor(&s->lu);
     s->factorizations++;
 }

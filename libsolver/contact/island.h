@@ -121,7 +121,9 @@ carom_contact_mode crm_contact_mode_of(const crm_contact *c, double ln, double l
 /* Keeps x, with its modes, when its residual r is the best so far.  Returns best <= accept. */
 int crm_island_offer(crm_island *s, crm_vec x, double r);
 
-/* K of the responses: shift I on bodies, -delta on joint rows; factors it. */
+/* K of the responses into the blocks: shift I on bodies, -delta on joint rows. */
+void crm_island_assemble(crm_island *s, double shift, double delta);
+/* Assembles and factors it. */
 void crm_island_factor(crm_island *s, double shift, double delta);
 /* x <- solution of [K, -J_e'; J_e, delta] x = x, and of its transpose. */
 void crm_island_solve(crm_island *s, double *x);
