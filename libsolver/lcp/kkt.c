@@ -2,6 +2,7 @@
 
 #include "libsolver/lcp/sparse.h"
 
+#include <float.h>
 #include <limits.h>
 #include <math.h>
 
@@ -145,11 +146,16 @@ carom_status crm_kkt_create(crm_kkt *k, crm_memory *memory, const carom_lcp_prob
     return k->symbolic ? CAROM_OK : CAROM_E_MEMORY;
 }
 
+void crm_kkt_forget(crm_kkt *k)
+{
+    if (k->numeric) klu_free_numeric(&k->numeric, &k->common);
+}
+
 void crm_kkt_destroy(crm_kkt *k, crm_memory *memory)
 {
     const size_t n = (size_t)k->n;
     const size_t m = (size_t)k->n_entries;
-    if (k->numeric) klu_free_numeric(&k->numeric, &k->common);
+    crm_kkt_forget(k);
     if (k->symbolic) klu_free_symbolic(&k->symbolic, &k->common);
     crm_free(memory, k->size, n, sizeof *k->size);
     crm_free(memory, k->fix, n, sizeof *k->fix);
@@ -197,14 +203,14 @@ static int healthy(crm_kkt *k, double rcond)
 
 static carom_status factor_fresh(crm_kkt *k)
 {
-    if (k->numeric) klu_free_numeric(&k->numeric, &k->common);
+    crm_kkt_forget(k);
     k->factorizations++;
     k->numeric = klu_factor(k->col, k->row, k->val, k->symbolic, &k->common);
     k->fresh = 1;
     if (k->common.status == KLU_OUT_OF_MEMORY || k->common.status == KLU_TOO_LARGE)
         return CAROM_E_MEMORY;
     if (k->numeric && healthy(k, SINGULAR_RCOND)) return CAROM_OK;
-    if (k->numeric) klu_free_numeric(&k->numeric, &k->common);
+    crm_kkt_forget(k);
     return CAROM_E_SINGULAR;
 }
 
@@ -226,6 +232,7 @@ static double residual(crm_kkt *k, int transposed, const double *rhs, const doub
     double *size = k->size;
     double top = 0.0;
     double scale = 0.0;
+    double given = 0.0;
     for (int i = 0; i < k->n; i++) {
         k->res[i] = rhs[i] + k->reg[i] * u[i];
         size[i] = fabs(rhs[i]);
@@ -238,10 +245,12 @@ static double residual(crm_kkt *k, int transposed, const double *rhs, const doub
             size[to] += fabs(t);
         }
     for (int i = 0; i < k->n; i++) {
-        if (!isfinite(k->res[i])) return HUGE_VAL;
+        if (!isfinite(k->res[i])) return k->left = HUGE_VAL;
         top = fmax(top, fabs(k->res[i]));
+        given = fmax(given, fabs(rhs[i]));
         scale = fmax(scale, size[i]);
     }
+    k->left = given > 0.0 ? top / given : scale > 0.0 ? HUGE_VAL : 0.0;
     return scale > 0.0 ? top / scale : 0.0;
 }
 
@@ -262,7 +271,7 @@ static double refine(crm_kkt *k, int transposed, int rounds, const double *rhs, 
         const double next = residual(k, transposed, rhs, u);
         if (!(next < error)) {
             for (int i = 0; i < k->n; i++) u[i] -= k->fix[i];
-            break;
+            return residual(k, transposed, rhs, u);
         }
         const int slow = next > 0.5 * error;
         error = next;
@@ -279,4 +288,12 @@ double crm_kkt_solve(crm_kkt *k, int transposed, int rounds, const double *rhs, 
     if (factor_fresh(k) < 0) return HUGE_VAL;
     if (!(error < HUGE_VAL)) memset(u, 0, (size_t)k->n * sizeof *u);
     return refine(k, transposed, rounds, rhs, u);
+}
+
+double crm_kkt_condition(crm_kkt *k)
+{
+    if (k->n == 0) return 1.0;
+    if (!k->numeric || !klu_condest(k->col, k->val, k->symbolic, k->numeric, &k->common))
+        return HUGE_VAL;
+    return k->common.condest <= DBL_MAX ? k->common.condest : HUGE_VAL; /* NaN too */
 }

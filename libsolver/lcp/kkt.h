@@ -30,6 +30,7 @@ typedef struct crm_kkt {
     double *fix;   /* n, scratch of refinement */
     double *size;  /* n, scratch of refinement */
     int fresh;     /* pivots were chosen for the present values */
+    double left;   /* after a solve: max |rhs - K u| / max |rhs| */
     int factorizations;
     int refactorizations;
     klu_common common;
@@ -48,6 +49,9 @@ typedef struct crm_kkt_reg {
 carom_status crm_kkt_create(crm_kkt *k, crm_memory *memory, const carom_lcp_problem *pattern);
 void crm_kkt_destroy(crm_kkt *k, crm_memory *memory);
 
+/* Drops the factors: what follows depends on no earlier call. */
+void crm_kkt_forget(crm_kkt *k);
+
 /* Values of K + D(r) for the numbers of p (same pattern) and row weights w, v: n_ineq each. */
 void crm_kkt_assemble(crm_kkt *k, const carom_lcp_problem *p, const double *w, const double *v,
                       crm_kkt_reg reg);
@@ -60,5 +64,8 @@ carom_status crm_kkt_factor(crm_kkt *k);
  * times; transposed: with K' instead of K.  u holds the start, rhs is kept.  Returns
  * max |rhs - K u| / max (|rhs| + |K| |u|), 0 when both are zero, HUGE_VAL when not finite. */
 double crm_kkt_solve(crm_kkt *k, int transposed, int rounds, const double *rhs, double *u);
+
+/* Estimate of the condition number of the factored matrix, 1-norm; HUGE_VAL when singular. */
+double crm_kkt_condition(crm_kkt *k);
 
 #endif

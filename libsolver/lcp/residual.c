@@ -64,6 +64,15 @@ static void scale_x(const carom_lcp_problem *p, const carom_lcp_point *at, doubl
     crm_sparse_add_abs_t(&p->G, p->n_x, w->row_z, w->row_x);
 }
 
+/* Rows of zeros have no scale of their own: they get the largest, or 1 where all are zero. */
+static void fill_zeros(int n, double *scale)
+{
+    double top = 0.0;
+    for (int i = 0; i < n; i++) top = fmax(top, scale[i]);
+    for (int i = 0; i < n; i++)
+        if (scale[i] == 0.0) scale[i] = top > 0.0 ? top : 1.0;
+}
+
 /* weigh_z: 1/Z_i = max_k |G_ik| / c_k; row_z: t_i = |m_i| + |G_i| X + |F_i| max(|z|, Z);
  * row_y: |b_i| + |A_i| X. */
 static void scale_constraints(const carom_lcp_problem *p, const carom_lcp_point *at, double size,
@@ -88,6 +97,7 @@ static void scale_constraints(const carom_lcp_problem *p, const carom_lcp_point 
         for (int k = p->F.col[j]; k < p->F.col[j + 1]; k++)
             w->row_z[p->F.row[k]] += fabs(p->F.val[k]) * z;
     }
+    fill_zeros(p->n_ineq, w->row_z);
 }
 
 /* weigh_z: 1/T_j = max(1/Z_j, max_i |F_ij| / t_i), or 1 / max |z| where z_j enters no equation. */

@@ -79,14 +79,22 @@ double crm_offer(carom_lcp *l, crm_iterate it)
     return residual;
 }
 
+/* The origin solves a problem that asks for nothing: q = 0, b = 0, m >= 0. */
+static void offer_origin(carom_lcp *l)
+{
+    memset(l->now.u, 0, (size_t)l->kkt.n * sizeof *l->now.u);
+    for (int i = 0; i < l->scaled.n_ineq; i++) l->now.s[i] = fmax(l->scaled.m[i], 0.0);
+    crm_offer(l, l->now);
+}
+
 /* Starts until one leads to an accepted point; CAROM_E_MEMORY is the only failure. */
 static carom_status search(carom_lcp *l)
 {
+    offer_origin(l);
     const int starts = l->scaled.n_ineq ? l->settings.max_starts : 1;
     for (int k = 0; k < starts && !(l->best_residual <= l->settings.accept); k++) {
         l->stats.starts++;
         if (crm_interior_run(l, k) == CAROM_E_MEMORY) return CAROM_E_MEMORY;
-        if (!(l->best_residual < HUGE_VAL) || l->settings.polish_rounds == 0) continue;
         if (crm_polish_run(l) == CAROM_E_MEMORY) return CAROM_E_MEMORY;
     }
     return CAROM_OK;
@@ -111,6 +119,7 @@ static carom_status solve(carom_lcp *l, const carom_lcp_problem *p, carom_lcp_po
     l->stats = none;
     l->best_residual = HUGE_VAL;
     count_factorizations(l, -1);
+    crm_kkt_forget(&l->kkt);
     crm_lcp_load(l, p);
     if (search(l) < 0) return CAROM_E_MEMORY;
     count_factorizations(l, 1);
@@ -123,7 +132,7 @@ static carom_status solve(carom_lcp *l, const carom_lcp_problem *p, carom_lcp_po
     return status;
 }
 
-static int point_given(const carom_lcp_problem *p, const carom_lcp_point *at)
+int crm_point_given(const carom_lcp_problem *p, const carom_lcp_point *at)
 {
     return at && (at->x || !p->n_x) && (at->z || !p->n_ineq) && (at->s || !p->n_ineq) &&
            (at->y || !p->n_eq);
@@ -132,7 +141,7 @@ static int point_given(const carom_lcp_problem *p, const carom_lcp_point *at)
 carom_status carom_lcp_solve(carom_lcp *l, const carom_lcp_problem *problem, carom_lcp_point *out,
                              carom_lcp_stats *stats)
 {
-    if (!l || !problem || !point_given(problem, out)) return CAROM_E_ARGUMENT;
+    if (!l || !problem || !crm_point_given(problem, out)) return CAROM_E_ARGUMENT;
     carom_status status = crm_lcp_check(l, problem);
     if (status < 0) return status;
     status = solve(l, problem, out);
@@ -144,7 +153,7 @@ carom_status carom_lcp_solve(carom_lcp *l, const carom_lcp_problem *problem, car
 
 double carom_lcp_residual(carom_lcp *l, const carom_lcp_problem *problem, const carom_lcp_point *at)
 {
-    if (!l || !problem || !point_given(problem, at)) return HUGE_VAL;
+    if (!l || !problem || !crm_point_given(problem, at)) return HUGE_VAL;
     if (!same_pattern(l, problem) || !numbers_finite(problem)) return HUGE_VAL;
     if (!crm_finite(problem->n_x, at->x) || !crm_finite(problem->n_ineq, at->s) ||
         !crm_finite(problem->n_ineq, at->z) || !crm_finite(problem->n_eq, at->y))

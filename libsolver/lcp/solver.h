@@ -60,6 +60,8 @@ carom_status crm_polish_run(carom_lcp *l);
 /* CAROM_OK when p fits the pattern of l, its numbers are finite and M is symmetric; else the status
  * to return. */
 carom_status crm_lcp_check(carom_lcp *l, const carom_lcp_problem *p);
+/* 1 when `at` has the arrays that p needs. */
+int crm_point_given(const carom_lcp_problem *p, const carom_lcp_point *at);
 /* Scales p into l->scaled and makes it l->problem. */
 void crm_lcp_load(carom_lcp *l, const carom_lcp_problem *p);
 

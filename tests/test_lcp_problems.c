@@ -1,0 +1,197 @@
+/* The contact problems of tests/data/lcp in the paper's four-variable form: how many the plain
+ * method and the default one solve, by family; every claim checked apart from the library. */
+#include "near.h"
+
+#include "carom/lcp.h"
+#include "fdiff.h"
+#include "four_variables.h"
+#include "lcp_case.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_FAMILIES = 32 };
+
+typedef struct tally {
+    const char *method;
+    carom_lcp_settings settings;
+    int n_families;
+    char family[MAX_FAMILIES][32];
+    int feasible[MAX_FAMILIES];
+    int solved[MAX_FAMILIES];
+    int all_feasible;
+    int all_solved;
+    int inexact;
+    int infeasible; /* problems without a solution */
+    int shown;      /* ... reported as such */
+    int failures;   /* claims that do not hold */
+} tally;
+
+static int family_index(tally *t, const char *family)
+{
+    int k = 0;
+    while (k < t->n_families && strcmp(t->family[k], family) != 0) k++;
+    if (k == t->n_families) {
+        assert_true(k < MAX_FAMILIES);
+        strcpy(t->family[t->n_families++], family);
+    }
+    return k;
+}
+
+/* Row sums of a triplet matrix times v, plain and absolute. */
+static void multiply(const problem_triplets *t, const double *v, double *sum, double *size)
+{
+    for (int k = 0; k < t->n; k++) {
+        sum[t->i[k]] += t->x[k] * v[t->j[k]];
+        size[t->i[k]] += fabs(t->x[k]) * fabs(v[t->j[k]]);
+    }
+}
+
+static void multiply_t(const problem_triplets *t, const double *l, double sign, double *sum,
+                       double *size)
+{
+    for (int k = 0; k < t->n; k++) {
+        sum[t->j[k]] += sign * t->x[k] * l[t->i[k]];
+        size[t->j[k]] += fabs(t->x[k] * l[t->i[k]]);
+    }
+}
+
+/* w = diag(J M^-1 J') */
+static void add_response(const problem_file *p, const problem_triplets *t, double *w)
+{
+    for (int k = 0; k < t->n; k++) w[t->i[k]] += t->x[k] * t->x[k] / p->M[t->j[k]];
+}
+
+/* The contact laws (4)-(6) themselves, with l_t = l+ - l-, by their natural residual (22), apart
+ * from the four-variable form: momentum componentwise, the rest relative to
+ * V = max(|v|, |q_i| / M_ii); an impulse counts by the velocity it gives, w l. */
+static double contact_error(const problem_file *p, const carom_lcp_point *at)
+{
+    const int nv = 3 * p->n_bodies;
+    const int nc = p->n_contacts;
+    double *room = calloc((size_t)(2 * nv + 7 * nc + 2 * p->n_joint_rows + 1), sizeof *room);
+    assert_non_null(room);
+    double *momentum = room;
+    double *size = momentum + nv;
+    double *un = size + nv;
+    double *ut = un + nc;
+    double *sn = ut + nc;
+    double *st = sn + nc;
+    double *lt = st + nc;
+    double *wn = lt + nc;
+    double *wt = wn + nc;
+    double *ue = wt + nc;
+    double *se = ue + p->n_joint_rows;
+    double V = 0.0;
+    double worst = 0.0;
+    for (int i = 0; i < nv; i++) {
+        momentum[i] = p->M[i] * at->x[i] + p->q[i];
+        V = fmax(V, fmax(fabs(at->x[i]), fabs(p->q[i]) / p->M[i]));
+    }
+    for (int i = 0; i < nv; i++) /* 1e-6 V: rounding noise of bodies at rest is no error */
+        size[i] = p->M[i] * (fabs(at->x[i]) + 1e-6 * V) + fabs(p->q[i]);
+    for (int k = 0; k < nc; k++) lt[k] = at->z[nc + 2 * k] - at->z[nc + 2 * k + 1];
+    multiply_t(&p->jc, at->z, -1.0, momentum, size);
+    multiply_t(&p->jt, lt, -1.0, momentum, size);
+    multiply_t(&p->je, at->y, 1.0, momentum, size);
+    multiply(&p->jc, at->x, un, sn);
+    multiply(&p->jt, at->x, ut, st);
+    multiply(&p->je, at->x, ue, se);
+    add_response(p, &p->jc, wn);
+    add_response(p, &p->jt, wt);
+    for (int i = 0; i < nv; i++)
+        if (size[i] > 0.0) worst = fmax(worst, fabs(momentum[i]) / size[i]);
+    for (int k = 0; k < nc; k++) {
+        const double a = un[k] + p->c[k];
+        const double scale = sn[k] + V + fabs(p->c[k]);
+        const double ln = at->z[k];
+        const double cone = p->mu[k] * fmax(ln, 0.0);
+        const double free_lt = lt[k] - (wt[k] > 0.0 ? ut[k] / wt[k] : 0.0);
+        const double held = fmax(-cone, fmin(cone, free_lt));
+        worst = fmax(worst, fabs(fmin(a, wn[k] * ln)) / scale);
+        worst = fmax(worst, wt[k] * fabs(lt[k] - held) / (st[k] + V));
+    }
+    for (int i = 0; i < p->n_joint_rows; i++)
+        if (V > 0.0) worst = fmax(worst, fabs(ue[i]) / (se[i] + V));
+    free(room);
+    return worst;
+}
+
+/* A claim of "solved" must hold for the contact laws, and give the known velocity where one is. */
+static void check_claim(tally *t, const problem_file *p, const carom_lcp_point *at)
+{
+    /* Families differ in the ratio of the two norms by the spread of entries in a row, up to 1e2 */
+    const double error = contact_error(p, at);
+    if (!(error <= 100.0 * t->settings.accept)) {
+        print_error("%s: %s: contact laws violated by %.2g\n", t->method, p->name, error);
+        t->failures++;
+    }
+}
+
+static void visit(const problem_file *p, void *user)
+{
+    tally *t = user;
+    four_variables f;
+    carom_lcp *l = NULL;
+    assert_int_equal(four_variables_make(p, &f), 0);
+    assert_int_equal(carom_lcp_create(&f.problem, &t->settings, NULL, &l), CAROM_OK);
+    carom_lcp_point at = lcp_point_new(&f.problem);
+    carom_lcp_stats stats;
+    const carom_status status = carom_lcp_solve(l, &f.problem, &at, &stats);
+    const int k = family_index(t, p->family);
+    t->feasible[k] += p->feasible;
+    t->all_feasible += p->feasible;
+    t->infeasible += !p->feasible;
+    t->shown += !p->feasible && status == CAROM_E_INFEASIBLE;
+    t->inexact += status == CAROM_INEXACT;
+    if (status == CAROM_OK) {
+        t->solved[k]++;
+        t->all_solved++;
+        check_claim(t, p, &at);
+    }
+    if ((p->feasible && status == CAROM_E_INFEASIBLE) || (!p->feasible && status >= CAROM_OK)) {
+        print_error("%s: %s: wrong status %s\n", t->method, p->name, carom_status_name(status));
+        t->failures++;
+    }
+    carom_lcp_destroy(l);
+    free(at.x);
+    four_variables_free(&f);
+}
+
+static tally run(const char *method, carom_lcp_settings settings)
+{
+    tally t;
+    memset(&t, 0, sizeof t);
+    t.method = method;
+    t.settings = settings;
+    assert_int_equal(problem_file_each(TEST_DATA "/lcp", visit, &t), 160);
+    assert_int_equal(t.all_feasible, 155);
+    assert_int_equal(t.failures, 0);
+    return t;
+}
+
+static void solves_and_says_what_it_does_not(void **state)
+{
+    (void)state;
+    const tally plain = run("plain", carom_lcp_plain());
+    const tally full = run("default", carom_lcp_defaults());
+    print_message("%-16s %8s %8s %8s\n", "family", "feasible", "plain", "default");
+    for (int k = 0; k < full.n_families; k++)
+        print_message("%-16s %8d %8d %8d\n", full.family[k], full.feasible[k], plain.solved[k],
+                      full.solved[k]);
+    print_message("%-16s %8d %8d %8d   (inexact: %d, %d; shown infeasible of %d: %d, %d)\n", "all",
+                  full.all_feasible, plain.all_solved, full.all_solved, plain.inexact, full.inexact,
+                  full.infeasible, plain.shown, full.shown);
+    /* Floors: the paper's method is known to solve 57 % of hard problems (docs/lcp.md); the default
+     * one is held to 95 %, below the 99 % measured, above anything a broken part would reach. */
+    assert_true(plain.all_solved >= 88);
+    assert_true(full.all_solved >= 147);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(solves_and_says_what_it_does_not),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
