@@ -16,8 +16,8 @@
 docs/python.md is the manual.
 """
 
-from .aio import AsyncClient
-from .client import Client
+from importlib import import_module
+
 from .errors import (
     CaromError,
     ComputationFailed,
@@ -29,6 +29,7 @@ from .errors import (
 )
 from .results import Gradient, State
 from .scene import Body, Joint, Scene
+from .server import Server
 from .shapes import Shape, box, capsule, circle, hull, segment
 from .trajectory import Trajectory
 
@@ -36,6 +37,15 @@ __version__ = "0.1.0"
 
 __all__ = [
     "AsyncClient", "Body", "CaromError", "Client", "ComputationFailed", "Gradient", "Joint",
-    "NoServer", "Refused", "Scene", "SceneError", "ServerTimeout", "SessionLost", "Shape", "State",
-    "Trajectory", "box", "capsule", "circle", "hull", "segment",
+    "NoServer", "Refused", "Scene", "SceneError", "Server", "ServerTimeout", "SessionLost", "Shape",
+    "State", "Trajectory", "box", "capsule", "circle", "hull", "segment",
 ]
+
+# The clients need the generated messages; scenes and trajectories do without.
+_CLIENTS = {"Client": ".client", "AsyncClient": ".aio"}
+
+
+def __getattr__(name):
+    if name in _CLIENTS:
+        return getattr(import_module(_CLIENTS[name], __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

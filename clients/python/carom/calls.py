@@ -84,8 +84,9 @@ class Calls:
     """The requests; `_run(exchange, finish)` of a subclass sees them through."""
 
     protocol: Protocol
+    scene = None  # as it was opened
     parameters = None  # Parameters, after the first descent
-    scene = None
+    seconds = 0.0  # the server spent on the last request that was answered
 
     def _run(self, exchange, finish):
         raise NotImplementedError
@@ -93,6 +94,7 @@ class Calls:
     def _request(self, exchange, finish=lambda exchange: None, numbered=True):
         def end(done):
             check(done)
+            self.seconds = done.reply.seconds
             return finish(done)
 
         return self._run(self.protocol.start(exchange, numbered), end)

@@ -35,17 +35,19 @@ def _rounded(v, r, arc):
     return np.vstack(parts)
 
 
-def draw_scene(axes, scene, q=None, color=None, alpha=1.0, label=None):
-    """Draws the bodies of a scene at the poses q, (n, 3); at the scene's own without."""
+def draw_scene(axes, scene, q=None, color=None, alpha=1.0, fill=True, label=None):
+    """Draws the bodies of a scene at the poses q, (n, 3); at the scene's own without.
+
+    color: of the dynamic bodies.  fill=False: outlines only."""
     q = scene.q() if q is None else np.asarray(q, float).reshape(-1, 3)
     for body in scene.bodies:
+        paint = color if color and body.type == "dynamic" else COLORS[body.type]
         for shape in body.shapes:
             points = outline(shape, q[body.index])
-            paint = color if color and body.type == "dynamic" else COLORS[body.type]
-            axes.fill(points[:, 0], points[:, 1], facecolor=paint, edgecolor="black", linewidth=0.6,
-                      alpha=alpha, label=label)
-            if body.type == "dynamic":
-                label = None
+            axes.fill(points[:, 0], points[:, 1], fill=fill, facecolor=paint, alpha=alpha,
+                      edgecolor="black" if fill else paint, linewidth=0.6 if fill else 1.2,
+                      label=label if body.type == "dynamic" else None)
+            label = None if body.type == "dynamic" else label
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
@@ -61,15 +63,15 @@ def plot_errors(axes, work, errors, label=None, xlabel="run time [s]", ylabel="e
     axes.grid(True, which="both", linewidth=0.3)
 
 
-def plot_convergence(figure, losses, values, truth=None, name="value", loss_label="loss"):
-    """Loss (logarithmic) and the parameter by iteration, one above the other."""
-    upper, lower = figure.subplots(2, 1, sharex=True)
+def plot_convergence(upper, lower, losses, values, truth=None, name="value"):
+    """Loss (logarithmic) on the upper axes and a parameter on the lower ones, by iteration."""
     k = np.arange(len(losses))
     upper.semilogy(k, losses, marker="o")
-    upper.set_ylabel(loss_label)
+    upper.set_ylabel("loss")
+    upper.grid(True, linewidth=0.3)
     lower.plot(k, values, marker="o")
     if truth is not None:
         lower.axhline(truth, color="black", linewidth=0.8, linestyle="--")
     lower.set_ylabel(name)
     lower.set_xlabel("iteration")
-    return upper, lower
+    lower.grid(True, linewidth=0.3)
