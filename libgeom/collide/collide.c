@@ -4,6 +4,10 @@
 #include "collide/closest.h"
 #include "collide/kernels.h"
 
+/* Cosine of the angle between an incident edge and the reference edge below which a cut is steep.
+ */
+static const double STEEP = 1e-3;
+
 static carom_recipe recipe_of(carom_kernel kernel, int ref, int inc, int flipped)
 {
     carom_recipe r;
@@ -27,7 +31,10 @@ static int opposite_edge(const crm_placed *q, int j, carom_vec2 m)
     return cos_u < cos_v ? before : j;
 }
 
-/* Edge k of p, vertex j of q closest to it.  Writes one or two recipes. */
+/* Edge k of p, vertex j of q closest to it.  Writes one or two recipes.  Let the incident edge of
+ * q, which runs against k, reach from `low` to `high` along k.  A vertex within rounding of the
+ * plane through an end of k counts as inside: where the incident edge is square to k, the cut would
+ * be anywhere on it. */
 static int clip_recipes(const crm_placed *p, int k, const crm_placed *q, int j, int flipped,
                         carom_recipe out[2])
 {
@@ -38,21 +45,23 @@ static int clip_recipes(const crm_placed *p, int k, const crm_placed *q, int j, 
     const carom_vec2 t = crm_scale(1.0 / length, e);
     const int i = opposite_edge(q, j, crm_right(t));
     const int i1 = crm_next(q, i);
-    /* The incident edge runs against t: its end lies toward the start of e. */
-    const double near_start = crm_dot(t, crm_between(p, k, q, i1));
-    const double near_end = crm_dot(t, crm_between(p, k, q, i));
-    if (!(near_start <= near_end)) return 1;
-    if (near_end < 0 || near_start > length) {
-        /* Past an end, by rounding.  Of an edge along the face the nearer vertex. */
+    const double low = crm_dot(t, crm_between(p, k, q, i1));
+    const double high = crm_dot(t, crm_between(p, k, q, i));
+    const double tol = crm_noise(p, k, q, j);
+    const double slack = high - low < STEEP * crm_length(crm_edge(q, i)) ? tol : 0;
+    const int low_inside = low >= -(i1 == j ? tol : slack);
+    const int high_inside = high <= length + (i == j ? tol : slack);
+    if ((!low_inside && high < slack) || (!high_inside && low > length - slack)) {
+        /* Nothing but a vertex over k: of an incident edge along the face the nearer one. */
         const double rise = crm_height(p, k, q, i) - crm_height(p, k, q, i1);
-        if (fabs(rise) <= crm_noise(q, i, q, i1)) out[0].inc = near_end < 0 ? i : i1;
+        if (fabs(rise) <= tol) out[0].inc = low_inside ? i1 : i;
         return 1;
     }
-    out[0] = near_start >= 0 ? recipe_of(CAROM_EDGE_VERTEX, k, i1, flipped)
-                             : recipe_of(CAROM_EDGE_CLIPPED, k, i, flipped);
-    out[1] = near_end <= length ? recipe_of(CAROM_EDGE_VERTEX, k, i, flipped)
-                                : recipe_of(CAROM_EDGE_CLIPPED, k, i, flipped);
-    out[1].at_end = out[1].kernel == CAROM_EDGE_CLIPPED;
+    out[0] = low_inside ? recipe_of(CAROM_EDGE_VERTEX, k, i1, flipped)
+                        : recipe_of(CAROM_EDGE_CLIPPED, k, i, flipped);
+    out[1] = high_inside ? recipe_of(CAROM_EDGE_VERTEX, k, i, flipped)
+                         : recipe_of(CAROM_EDGE_CLIPPED, k, i, flipped);
+    out[1].at_end = !high_inside;
     return 2;
 }
 

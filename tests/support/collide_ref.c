@@ -97,6 +97,34 @@ static void try_vertices(const collide_ref_shape *p, const collide_ref_shape *q,
     }
 }
 
+/* Comparing distances loses half the digits of the normal.  A face is closest when the vertices
+ * lowest over it (one, or the two of a parallel edge) have a foot on it: linear, hence sharp. */
+static void sharpen(const collide_ref_shape *p, const collide_ref_shape *q, int sign,
+                    long double noise, collide_ref *best)
+{
+    for (int k = 0; p->n > 1 && k < p->n; k++) {
+        const int l = (k + 1) % p->n;
+        const long double ex = p->x[l] - p->x[k];
+        const long double ey = p->y[l] - p->y[k];
+        const long double length = sqrtl(ex * ex + ey * ey);
+        const long double tx = ex / length;
+        const long double ty = ey / length;
+        const long double low = lowest(q, ty, -tx);
+        long double first = HUGE_VALL;
+        long double last = -HUGE_VALL;
+        for (int j = 0; j < q->n; j++) {
+            if (ty * q->x[j] - tx * q->y[j] > low + noise) continue;
+            const long double foot = tx * (q->x[j] - p->x[k]) + ty * (q->y[j] - p->y[k]);
+            first = fminl(first, foot);
+            last = fmaxl(last, foot);
+        }
+        if (low - (ty * p->x[k] - tx * p->y[k]) > noise && last >= 0 && first <= length) {
+            best->nx = sign * ty;
+            best->ny = -sign * tx;
+        }
+    }
+}
+
 static long double size_of(const collide_ref_shape *s)
 {
     long double size = s->radius;
@@ -117,6 +145,8 @@ collide_ref collide_ref_solve(const collide_ref_shape *a, const collide_ref_shap
     /* Points and segments in line have no face that separates: their faces' zero is exact up to
      * rounding. */
     const long double size = fmaxl(size_of(a), size_of(b));
+    sharpen(a, b, 1, 1e-18L * size, &apart);
+    sharpen(b, a, -1, 1e-18L * size, &apart);
     const int disjoint = (a->n == 1 && b->n == 1) || face.gap > -1e-18L * size;
     collide_ref r = disjoint ? apart : face;
     r.distance = r.gap - a->radius - b->radius;
