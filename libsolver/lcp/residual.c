@@ -5,8 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Entries of x below this part of the largest are rounding noise: with accept = 1e-10 an error of
- * 1e-16 of the largest never counts in an equation of momentum [1]. */
+/* With accept = 1e-10, an error of 1e-16 of the largest x, or of a multiplier, never counts [1]. */
 static const double NOISE = 1e-6;
 
 void crm_linear_residual(const carom_lcp_problem *p, const carom_lcp_point *at, double *rx,
@@ -35,14 +34,20 @@ static double worse(double worst, double next)
     return next <= worst ? worst : isnan(next) ? HUGE_VAL : next;
 }
 
+static double diagonal_of(const carom_sparse *M, int j)
+{
+    double sum = 0.0;
+    for (int k = M->col ? M->col[j] : 0; M->col && k < M->col[j + 1]; k++)
+        if (M->row[k] == j) sum += M->val[k];
+    return sum;
+}
+
 /* X = max(|x|, |q_i| / M_ii): the size of x with and without constraints. */
 static double size_of_x(const carom_lcp_problem *p, const double *x)
 {
     double size = 0.0;
     for (int j = 0; j < p->n_x; j++) {
-        double diagonal = 0.0;
-        for (int k = p->M.col ? p->M.col[j] : 0; p->M.col && k < p->M.col[j + 1]; k++)
-            if (p->M.row[k] == j) diagonal += p->M.val[k];
+        const double diagonal = diagonal_of(&p->M, j);
         size = worse(size, fabs(x[j]));
         if (diagonal > 0.0) size = worse(size, fabs(p->q[j]) / diagonal);
     }
@@ -73,27 +78,43 @@ static void fill_zeros(int n, double *scale)
         if (scale[i] == 0.0) scale[i] = top > 0.0 ? top : 1.0;
 }
 
-/* weigh_z: 1/Z_i = max_k |G_ik| / c_k; row_z: t_i = |m_i| + |G_i| X + |F_i| max(|z|, Z);
- * row_y: |b_i| + |A_i| X. */
-static void scale_constraints(const carom_lcp_problem *p, const carom_lcp_point *at, double size,
-                              const crm_residual_work *w)
+/* row_z: |m_i| + |G_i| X; row_y: |b_i| + |A_i| X. */
+static void scale_rows(const carom_lcp_problem *p, double size, const crm_residual_work *w)
 {
-    for (int i = 0; i < p->n_ineq; i++) {
-        w->row_z[i] = fabs(p->m[i]);
-        w->weigh_z[i] = 0.0;
-    }
+    for (int i = 0; i < p->n_ineq; i++) w->row_z[i] = fabs(p->m[i]);
     for (int i = 0; i < p->n_eq; i++) w->row_y[i] = fabs(p->b[i]);
     for (int j = 0; j < p->n_x; j++) w->abs_x[j] = size;
     crm_sparse_add_abs(&p->A, p->n_x, w->abs_x, w->row_y);
     crm_sparse_add_abs(&p->G, p->n_x, w->abs_x, w->row_z);
-    for (int j = 0; p->G.col && j < p->n_x; j++)
+}
+
+/* weigh_z: 1/Z_i = max(max_k |G_ik| / c_k, sum_k G_ik^2 / M_kk / row_z): what a unit of z_i does to
+ * an equation of momentum, and to its own row through diag(M). */
+static void weigh_by_momentum(const carom_lcp_problem *p, const crm_residual_work *w)
+{
+    double *response = w->rz; /* free until the residuals are evaluated */
+    for (int i = 0; i < p->n_ineq; i++) w->weigh_z[i] = response[i] = 0.0;
+    for (int j = 0; p->G.col && j < p->n_x; j++) {
+        const double diagonal = diagonal_of(&p->M, j);
         for (int k = p->G.col[j]; k < p->G.col[j + 1]; k++) {
             const int i = p->G.row[k];
-            w->weigh_z[i] = fmax(w->weigh_z[i], ratio(p->G.val[k], w->row_x[j]));
+            const double g = p->G.val[k];
+            w->weigh_z[i] = fmax(w->weigh_z[i], ratio(g, w->row_x[j]));
+            if (diagonal > 0.0) response[i] += g * g / diagonal;
         }
+    }
+    for (int i = 0; i < p->n_ineq; i++)
+        w->weigh_z[i] = fmax(w->weigh_z[i], ratio(response[i], w->row_z[i]));
+}
+
+/* row_z: t_i = |m_i| + |G_i| X + |F_i| max(NOISE |z|, Z), |z| where z_j has no row in G and thus no
+ * Z: the rounding of large multipliers is no error, more than that is. */
+static void scale_coupled_rows(const carom_lcp_problem *p, const carom_lcp_point *at,
+                               const crm_residual_work *w)
+{
     for (int j = 0; p->F.col && j < p->n_ineq; j++) {
-        const double floor = w->weigh_z[j] > 0.0 ? 1.0 / w->weigh_z[j] : 0.0;
-        const double z = fmax(fabs(at->z[j]), floor);
+        const double Z = w->weigh_z[j] > 0.0 ? 1.0 / w->weigh_z[j] : fabs(at->z[j]);
+        const double z = fmax(NOISE * fabs(at->z[j]), Z);
         for (int k = p->F.col[j]; k < p->F.col[j + 1]; k++)
             w->row_z[p->F.row[k]] += fabs(p->F.val[k]) * z;
     }
@@ -127,10 +148,12 @@ double crm_natural_residual(const carom_lcp_problem *p, const carom_lcp_point *a
 {
     double worst = 0.0;
     const double size = size_of_x(p, at->x);
-    crm_linear_residual(p, at, w->rx, w->rz, w->ry);
     scale_x(p, at, size, w);
-    scale_constraints(p, at, size, w);
+    scale_rows(p, size, w);
+    weigh_by_momentum(p, w);
+    scale_coupled_rows(p, at, w);
     scale_z(p, at, w);
+    crm_linear_residual(p, at, w->rx, w->rz, w->ry);
     for (int i = 0; i < p->n_x; i++) worst = worse(worst, ratio(w->rx[i], w->row_x[i]));
     for (int i = 0; i < p->n_eq; i++) worst = worse(worst, ratio(w->ry[i], w->row_y[i]));
     for (int i = 0; i < p->n_ineq; i++) {
