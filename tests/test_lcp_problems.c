@@ -3,7 +3,6 @@
 #include "near.h"
 
 #include "carom/lcp.h"
-#include "fdiff.h"
 #include "four_variables.h"
 #include "lcp_case.h"
 
