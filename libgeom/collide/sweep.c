@@ -20,8 +20,8 @@ static double extent_of(const crm_placed *p)
     return fmax(fmax(high.x - low.x, high.y - low.y), p->radius);
 }
 
-/* Corners that turn less than 84 degrees are blunt: squared cosine.  At 90 degrees a rounding of the
- * normal decides whether an edge of the other core lies flat at the top. */
+/* Corners that turn less than 84 degrees are blunt: squared cosine.  At 90 degrees a rounding of
+ * the normal decides whether an edge of the other core lies flat at the top. */
 static const double BLUNT = 0.01;
 
 typedef struct best_face {
