@@ -1,6 +1,6 @@
-/* check.c: validation of shapes.  Vertices are differentiable parameters, so nothing is repaired.
- */
-#include "carom/shape.h"
+/* check.c: validation of shapes and chains.  Vertices are differentiable parameters, so nothing is
+ * repaired. */
+#include "carom/chain.h"
 
 #include "vec.h"
 
@@ -71,9 +71,8 @@ static carom_shape_error check_numbers(const carom_shape *s)
     return valid();
 }
 
-static carom_shape_error check_duplicates(const carom_shape *s, double extent)
+static carom_shape_error check_duplicates(const carom_shape *s, int n_edges, double extent)
 {
-    const int n_edges = s->count > 2 ? s->count : s->count - 1;
     for (int i = 0; i < n_edges; i++) {
         const carom_vec2 e = edge(s, i);
         /* Not the squares: they underflow for extents the next test refuses. */
@@ -138,7 +137,7 @@ static carom_shape_error find_fault(const carom_shape *s)
     carom_shape_error e = check_numbers(s);
     if (e.fault) return e;
     const double extent = extent_of(s);
-    e = check_duplicates(s, extent);
+    e = check_duplicates(s, s->count > 2 ? s->count : s->count - 1, extent);
     if (e.fault || s->count < 3) return e;
     e = check_collinear(s, extent);
     if (!e.fault) e = check_turning(s);
@@ -150,6 +149,38 @@ carom_status carom_shape_check(const carom_shape *shape, carom_shape_error *erro
 {
     if (!shape || (shape->count > 0 && !shape->vertices)) return CAROM_E_ARGUMENT;
     const carom_shape_error e = find_fault(shape);
+    if (error) *error = e;
+    return e.fault ? CAROM_E_SHAPE : CAROM_OK;
+}
+
+static carom_shape_error check_folds(const carom_chain *chain, const carom_shape *s)
+{
+    const int skip = chain->closed ? 0 : 1;
+    for (int i = skip; i < s->count - skip; i++) {
+        const carom_vec2 before = edge(s, i - 1);
+        const carom_vec2 after = edge(s, i);
+        const double cos = crm_dot(before, after);
+        if (cos < 0 && fabs(crm_cross(before, after)) <= -SHAPE_TOL * cos) {
+            return fault(CAROM_SHAPE_FOLD, i);
+        }
+    }
+    return valid();
+}
+
+static carom_shape_error find_chain_fault(const carom_chain *chain)
+{
+    const carom_shape s = carom_chain_shape(chain);
+    if (s.count < (chain->closed ? 3 : 2)) return fault(CAROM_SHAPE_COUNT, -1);
+    carom_shape_error e = check_numbers(&s);
+    if (!e.fault) e = check_duplicates(&s, carom_chain_links(chain), extent_of(&s));
+    if (!e.fault) e = check_folds(chain, &s);
+    return e;
+}
+
+carom_status carom_chain_check(const carom_chain *chain, carom_shape_error *error)
+{
+    if (!chain || (chain->count > 0 && !chain->vertices)) return CAROM_E_ARGUMENT;
+    const carom_shape_error e = find_chain_fault(chain);
     if (error) *error = e;
     return e.fault ? CAROM_E_SHAPE : CAROM_OK;
 }
@@ -176,6 +207,8 @@ static const char *sentence(carom_shape_fault what)
         return "the area is nearly zero; give a segment of two vertices or move "
                "the vertices apart";
     case CAROM_SHAPE_SIZE: return "a length is outside 1e-100 .. 1e100 m; scale the shape";
+    case CAROM_SHAPE_FOLD:
+        return "the chain turns back onto itself; move the vertex or end the chain there";
     }
     return "unknown fault";
 }

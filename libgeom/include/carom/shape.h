@@ -32,7 +32,8 @@ typedef enum carom_shape_fault {
                              */
     CAROM_SHAPE_CROSSING,   /* the outline crosses itself, or winds around more than once */
     CAROM_SHAPE_AREA,       /* area below 1e-12 of the squared extent */
-    CAROM_SHAPE_SIZE        /* a length outside 1e-100 .. 1e100 m: its square could overflow */
+    CAROM_SHAPE_SIZE,       /* a length outside 1e-100 .. 1e100 m: its square could overflow */
+    CAROM_SHAPE_FOLD        /* chains: at a vertex the chain turns back onto itself */
 } carom_shape_fault;
 
 typedef struct carom_shape_error {
