@@ -51,8 +51,8 @@ static void refuses_settings(void **state)
     lcp_case c = lcp_case_dense(&SMALL, 0);
     carom_lcp *l = NULL;
     const carom_lcp_settings good = carom_lcp_defaults();
-    carom_lcp_settings bad[10];
-    for (int i = 0; i < 10; i++) bad[i] = good;
+    carom_lcp_settings bad[11];
+    for (int i = 0; i < 11; i++) bad[i] = good;
     bad[0].accept = 0.0;
     bad[1].accept = NAN;
     bad[2].inexact = 0.5 * good.accept;
@@ -63,7 +63,8 @@ static void refuses_settings(void **state)
     bad[7].polish_rounds = -1;
     bad[8].equilibrate = 2;
     bad[9].inexact = NAN;
-    for (int i = 0; i < 10; i++) {
+    bad[10].certify = -1;
+    for (int i = 0; i < 11; i++) {
         assert_int_equal(carom_lcp_create(&c.p, &bad[i], NULL, &l), CAROM_E_ARGUMENT);
         assert_null(l);
     }
@@ -156,13 +157,15 @@ static void survives_exhaustion(void **state)
 {
     (void)state;
     lcp_case c = lcp_case_dense(&SMALL, 0);
+    carom_lcp_settings settings = carom_lcp_defaults();
+    settings.certify = 1; /* the most that is ever requested */
     carom_status status = CAROM_E_MEMORY;
     long k;
     for (k = 0; k < 1000 && status != CAROM_OK; k++) {
         alloc_fail a = alloc_fail_at(k);
         const carom_allocator from = alloc_fail_allocator(&a);
         carom_lcp *l = NULL;
-        status = carom_lcp_create(&c.p, NULL, &from, &l);
+        status = carom_lcp_create(&c.p, &settings, &from, &l);
         if (status != CAROM_OK) {
             assert_int_equal(status, CAROM_E_MEMORY);
             assert_null(l);
@@ -172,7 +175,7 @@ static void survives_exhaustion(void **state)
         assert_int_equal(a.n_live, 0);
         assert_int_equal(a.n_bad_sizes, 0);
     }
-    assert_in_range(k, 5, 999); /* several requests were made, and all were failed */
+    assert_in_range(k, 30, 999); /* several requests were made, and all were failed */
     lcp_case_free(&c);
 }
 
@@ -184,8 +187,10 @@ static void steady_state_requests_nothing(void **state)
     lcp_case c = lcp_case_planted(&r, 12, 8, 3, 0.4, LCP_MONOTONE);
     alloc_fail a = alloc_fail_never();
     const carom_allocator from = alloc_fail_allocator(&a);
+    carom_lcp_settings settings = carom_lcp_defaults();
     carom_lcp *l = NULL;
-    assert_int_equal(carom_lcp_create(&c.p, NULL, &from, &l), CAROM_OK);
+    settings.certify = 1;
+    assert_int_equal(carom_lcp_create(&c.p, &settings, &from, &l), CAROM_OK);
     const long calls = a.n_calls;
     size_t bytes;
     long counted;

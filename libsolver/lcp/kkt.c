@@ -1,5 +1,6 @@
 #include "libsolver/lcp/kkt.h"
 
+#include "libsolver/lcp/entries.h"
 #include "libsolver/lcp/sparse.h"
 
 #include <float.h>
@@ -15,45 +16,17 @@ static const double REUSE_RESIDUAL = 1e-10;
 /* Refinement ends when the residual is at rounding level or does not halve. */
 static const double ROUNDING = 2.3e-16;
 
-/* One entry of the pattern, before merging: the lists of kkt.h in the order of n_entries. */
-typedef struct entry_list {
-    int *row;
-    int *col;
-    int n;
-} entry_list;
-
-static void put(entry_list *e, int row, int col)
-{
-    e->row[e->n] = row;
-    e->col[e->n] = col;
-    e->n++;
-}
-
-/* Block a of n_cols columns at (row0, col0), or its transpose there. */
-static void put_block(entry_list *e, const carom_sparse *a, int n_cols, int row0, int col0,
-                      int transposed)
-{
-    for (int j = 0; a->col && j < n_cols; j++)
-        for (int p = a->col[j]; p < a->col[j + 1]; p++) {
-            const int i = a->row[p];
-            if (transposed)
-                put(e, row0 + j, col0 + i);
-            else
-                put(e, row0 + i, col0 + j);
-        }
-}
-
-static void list_entries(const carom_lcp_problem *p, entry_list *e)
+static void list_entries(const carom_lcp_problem *p, crm_entries *e)
 {
     const int z = p->n_x;
     const int y = p->n_x + p->n_ineq;
-    put_block(e, &p->M, p->n_x, 0, 0, 0);
-    put_block(e, &p->A, p->n_x, y, 0, 0);
-    put_block(e, &p->A, p->n_x, 0, y, 1);
-    put_block(e, &p->G, p->n_x, z, 0, 0);
-    put_block(e, &p->G, p->n_x, 0, z, 1);
-    put_block(e, &p->F, p->n_ineq, z, z, 0);
-    for (int i = 0; i < y + p->n_eq; i++) put(e, i, i);
+    crm_entries_block(e, &p->M, p->n_x, 0, 0, 0);
+    crm_entries_block(e, &p->A, p->n_x, y, 0, 0);
+    crm_entries_block(e, &p->A, p->n_x, 0, y, 1);
+    crm_entries_block(e, &p->G, p->n_x, z, 0, 0);
+    crm_entries_block(e, &p->G, p->n_x, 0, z, 1);
+    crm_entries_block(e, &p->F, p->n_ineq, z, z, 0);
+    crm_entries_diagonal(e, y + p->n_eq, 0, 0);
 }
 
 /* Stable counting sort of order[0..m) by key[order[.]] in 0..n-1. */
@@ -66,7 +39,7 @@ static void sort_by(int m, int n, const int *key, const int *order, int *start, 
 }
 
 /* Merges the sorted entries into col, row and map. */
-static void merge(crm_kkt *k, const entry_list *e, const int *order)
+static void merge(crm_kkt *k, const crm_entries *e, const int *order)
 {
     int last = -1;
     memset(k->col, 0, ((size_t)k->n + 1) * sizeof *k->col);
@@ -88,7 +61,7 @@ static carom_status build_pattern(crm_kkt *k, crm_memory *memory, const carom_lc
     const size_t m = (size_t)k->n_entries;
     const size_t n1 = (size_t)k->n + 1;
     carom_status status = CAROM_E_MEMORY;
-    entry_list e = {crm_new(memory, m, sizeof(int)), crm_new(memory, m, sizeof(int)), 0};
+    crm_entries e = {crm_new(memory, m, sizeof(int)), crm_new(memory, m, sizeof(int)), 0};
     int *start = crm_new(memory, n1, sizeof(int));
     int *first = crm_new(memory, m, sizeof(int));
     int *second = crm_new(memory, m, sizeof(int));

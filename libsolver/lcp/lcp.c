@@ -1,9 +1,10 @@
+#include "libsolver/lcp/carve.h"
 #include "libsolver/lcp/solver.h"
 #include "libsolver/lcp/sparse.h"
 
 carom_lcp_settings carom_lcp_defaults(void)
 {
-    const carom_lcp_settings s = {1e-10, 1e-6, 60, 8, 12, 1};
+    const carom_lcp_settings s = {1e-10, 1e-6, 60, 8, 12, 1, 0};
     return s;
 }
 
@@ -20,7 +21,8 @@ static int settings_valid(const carom_lcp_settings *s)
 {
     return s->accept > 0.0 && s->accept <= s->inexact && s->inexact < 1.0 &&
            s->max_iterations >= 1 && s->max_starts >= 1 && s->max_starts <= crm_interior_starts() &&
-           s->polish_rounds >= 0 && (s->equilibrate == 0 || s->equilibrate == 1);
+           s->polish_rounds >= 0 && (s->equilibrate == 0 || s->equilibrate == 1) &&
+           (s->certify == 0 || s->certify == 1);
 }
 
 static int pattern_valid(const carom_lcp_problem *p)
@@ -31,35 +33,21 @@ static int pattern_valid(const carom_lcp_problem *p)
            crm_sparse_valid(&p->F, p->n_ineq, p->n_ineq);
 }
 
-/* Cuts arrays out of a block; base NULL: only counts. */
-typedef struct carver {
-    char *base;
-    size_t size; /* of an element */
-    size_t used; /* elements */
-} carver;
-
-static void *carve(carver *c, size_t n)
-{
-    void *p = c->base ? c->base + c->used * c->size : NULL;
-    c->used += n;
-    return p;
-}
-
 static size_t count(const carom_sparse *a, int n_cols)
 {
     return (size_t)crm_sparse_count(a, n_cols);
 }
 
 /* Places the numbers of the scaled problem. */
-static void place_numbers(carom_lcp *l, const carom_lcp_problem *p, carver *c)
+static void place_numbers(carom_lcp *l, const carom_lcp_problem *p, crm_carver *c)
 {
-    l->number.M = carve(c, count(&p->M, p->n_x));
-    l->number.A = carve(c, count(&p->A, p->n_x));
-    l->number.G = carve(c, count(&p->G, p->n_x));
-    l->number.F = carve(c, count(&p->F, p->n_ineq));
-    l->number.q = carve(c, (size_t)p->n_x);
-    l->number.b = carve(c, (size_t)p->n_eq);
-    l->number.m = carve(c, (size_t)p->n_ineq);
+    l->number.M = crm_carve(c, count(&p->M, p->n_x));
+    l->number.A = crm_carve(c, count(&p->A, p->n_x));
+    l->number.G = crm_carve(c, count(&p->G, p->n_x));
+    l->number.F = crm_carve(c, count(&p->F, p->n_ineq));
+    l->number.q = crm_carve(c, (size_t)p->n_x);
+    l->number.b = crm_carve(c, (size_t)p->n_eq);
+    l->number.m = crm_carve(c, (size_t)p->n_ineq);
     l->scaled.M.val = l->number.M;
     l->scaled.A.val = l->number.A;
     l->scaled.G.val = l->number.G;
@@ -69,45 +57,44 @@ static void place_numbers(carom_lcp *l, const carom_lcp_problem *p, carver *c)
     l->scaled.m = l->number.m;
 }
 
-static void place_vectors(carom_lcp *l, carver *c)
+static void place_vectors(carom_lcp *l, crm_carver *c)
 {
     const size_t nx = (size_t)l->scaled.n_x;
     const size_t nz = (size_t)l->scaled.n_ineq;
     const size_t ny = (size_t)l->scaled.n_eq;
     const size_t n = nx + nz + ny;
     double **const of_x[] = {&l->scale.x, &l->plain.x, &l->work.rx, &l->work.abs_x, &l->work.row_x};
-    double **const of_z[] = {&l->scale.z,    &l->plain.z,      &l->plain.s, &l->work.rz,
-                             &l->work.row_z, &l->work.weigh_z, &l->w,       &l->v,
-                             &l->ds,         &l->target,       &l->now.s,   &l->best.s};
+    double **const of_z[] = {
+        &l->scale.z, &l->plain.z, &l->plain.s, &l->work.rz, &l->work.row_z, &l->work.weigh_z, &l->w,
+        &l->v,       &l->ds,      &l->target,  &l->now.s,   &l->best.s,     &l->lead.s};
     double **const of_y[] = {&l->scale.y, &l->plain.y, &l->work.ry, &l->work.row_y};
-    double **const of_all[] = {&l->now.u, &l->best.u, &l->rhs, &l->res, &l->du};
-    for (size_t i = 0; i < sizeof of_x / sizeof *of_x; i++) *of_x[i] = carve(c, nx);
-    for (size_t i = 0; i < sizeof of_z / sizeof *of_z; i++) *of_z[i] = carve(c, nz);
-    for (size_t i = 0; i < sizeof of_y / sizeof *of_y; i++) *of_y[i] = carve(c, ny);
-    for (size_t i = 0; i < sizeof of_all / sizeof *of_all; i++) *of_all[i] = carve(c, n);
+    double **const of_all[] = {&l->now.u, &l->best.u, &l->lead.u, &l->rhs, &l->res, &l->du};
+    for (size_t i = 0; i < sizeof of_x / sizeof *of_x; i++) *of_x[i] = crm_carve(c, nx);
+    for (size_t i = 0; i < sizeof of_z / sizeof *of_z; i++) *of_z[i] = crm_carve(c, nz);
+    for (size_t i = 0; i < sizeof of_y / sizeof *of_y; i++) *of_y[i] = crm_carve(c, ny);
+    for (size_t i = 0; i < sizeof of_all / sizeof *of_all; i++) *of_all[i] = crm_carve(c, n);
 }
 
 static carom_status place_reals(carom_lcp *l, const carom_lcp_problem *p)
 {
-    carver c = {NULL, sizeof(double), 0};
+    crm_carver c = {NULL, sizeof(double), 0};
     place_numbers(l, p, &c);
     place_vectors(l, &c);
     l->n_reals = c.used;
     l->reals = crm_new(&l->memory, l->n_reals, sizeof(double));
     if (!l->reals) return CAROM_E_MEMORY;
-    c.base = (char *)l->reals;
-    c.used = 0;
+    c = crm_carver_at(l->reals, sizeof(double));
     place_numbers(l, p, &c);
     place_vectors(l, &c);
     return CAROM_OK;
 }
 
-static void copy_pattern(const carom_sparse *from, int n_cols, carver *c, carom_sparse *to)
+static void copy_pattern(const carom_sparse *from, int n_cols, crm_carver *c, carom_sparse *to)
 {
     if (!from->col) return;
     const size_t n = count(from, n_cols);
-    int *col = carve(c, (size_t)n_cols + 1);
-    int *row = carve(c, n);
+    int *col = crm_carve(c, (size_t)n_cols + 1);
+    int *row = crm_carve(c, n);
     if (!c->base) return;
     memcpy(col, from->col, ((size_t)n_cols + 1) * sizeof *col);
     if (n) memcpy(row, from->row, n * sizeof *row);
@@ -115,7 +102,7 @@ static void copy_pattern(const carom_sparse *from, int n_cols, carver *c, carom_
     to->row = row;
 }
 
-static void copy_patterns(carom_lcp *l, const carom_lcp_problem *p, carver *c)
+static void copy_patterns(carom_lcp *l, const carom_lcp_problem *p, crm_carver *c)
 {
     copy_pattern(&p->M, p->n_x, c, &l->scaled.M);
     copy_pattern(&p->A, p->n_x, c, &l->scaled.A);
@@ -125,13 +112,12 @@ static void copy_patterns(carom_lcp *l, const carom_lcp_problem *p, carver *c)
 
 static carom_status place_ints(carom_lcp *l, const carom_lcp_problem *p)
 {
-    carver c = {NULL, sizeof(int), 0};
+    crm_carver c = {NULL, sizeof(int), 0};
     copy_patterns(l, p, &c);
     l->n_ints = c.used;
     l->ints = crm_new(&l->memory, l->n_ints, sizeof(int));
     if (!l->ints) return CAROM_E_MEMORY;
-    c.base = (char *)l->ints;
-    c.used = 0;
+    c = crm_carver_at(l->ints, sizeof(int));
     copy_patterns(l, p, &c);
     return CAROM_OK;
 }
@@ -144,6 +130,8 @@ static carom_status build(carom_lcp *l, const carom_lcp_problem *pattern)
     carom_status status = crm_kkt_create(&l->kkt, &l->memory, pattern);
     if (status == CAROM_OK) status = place_ints(l, pattern);
     if (status == CAROM_OK) status = place_reals(l, pattern);
+    if (status == CAROM_OK && l->settings.certify)
+        status = crm_certifier_create(&l->certifier, &l->memory, pattern);
     return status;
 }
 
@@ -171,6 +159,7 @@ void carom_lcp_destroy(carom_lcp *l)
 {
     if (!l) return;
     crm_memory memory = l->memory;
+    crm_certifier_destroy(&l->certifier, &memory);
     crm_kkt_destroy(&l->kkt, &memory);
     crm_free(&memory, l->reals, l->n_reals, sizeof(double));
     crm_free(&memory, l->ints, l->n_ints, sizeof(int));
@@ -179,6 +168,9 @@ void carom_lcp_destroy(carom_lcp *l)
 
 void carom_lcp_memory(const carom_lcp *l, size_t *bytes, long *calls)
 {
-    if (bytes) *bytes = l->memory.live;
-    if (calls) *calls = l->memory.n_calls;
+    size_t inner_bytes = 0;
+    long inner_calls = 0;
+    if (l->certifier.inner) carom_lcp_memory(l->certifier.inner, &inner_bytes, &inner_calls);
+    if (bytes) *bytes = l->memory.live + inner_bytes;
+    if (calls) *calls = l->memory.n_calls + inner_calls;
 }

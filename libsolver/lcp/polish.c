@@ -81,7 +81,8 @@ carom_status crm_polish_run(carom_lcp *l)
 {
     uint64_t seen[MEMORY];
     int n_seen = 0;
-    crm_iterate_copy(l, l->best, l->now);
+    if (!(l->lead_residual < HUGE_VAL)) return CAROM_OK;
+    crm_iterate_copy(l, l->lead, l->now);
     const carom_lcp_point at = crm_iterate_point(l, l->now);
     for (int i = 0; i < l->scaled.n_ineq; i++) l->w[i] = at.z[i] > at.s[i] ? 1.0 : 0.0;
     for (int k = 0; k < l->settings.polish_rounds; k++) {

@@ -54,7 +54,8 @@ static double size_of_x(const carom_lcp_problem *p, const double *x)
     return size;
 }
 
-/* row_x: c_i = |q_i| + |M_i| (|x| + NOISE X) + |A'|_i |y| + |G'|_i |z|. */
+/* row_x: c_i = |q_i| + |M_i| (|x| + NOISE X) + |A'|_i |y| + |G'|_i |z|; where M_ii = 0, at least
+ * NOISE of the largest: nothing else gives such a row a size when its multipliers vanish. */
 static void scale_x(const carom_lcp_problem *p, const carom_lcp_point *at, double size,
                     const crm_residual_work *w)
 {
@@ -67,6 +68,10 @@ static void scale_x(const carom_lcp_problem *p, const carom_lcp_point *at, doubl
     crm_sparse_add_abs_t(&p->A, p->n_x, w->row_y, w->row_x);
     for (int i = 0; i < p->n_ineq; i++) w->row_z[i] = fabs(at->z[i]);
     crm_sparse_add_abs_t(&p->G, p->n_x, w->row_z, w->row_x);
+    double top = 0.0;
+    for (int i = 0; i < p->n_x; i++) top = fmax(top, w->row_x[i]);
+    for (int i = 0; i < p->n_x; i++)
+        if (!(diagonal_of(&p->M, i) > 0.0)) w->row_x[i] = fmax(w->row_x[i], NOISE * top);
 }
 
 /* Rows of zeros have no scale of their own: they get the largest, or 1 where all are zero. */

@@ -73,9 +73,14 @@ double crm_offer(carom_lcp *l, crm_iterate it)
     const carom_lcp_point at = crm_iterate_point(l, it);
     crm_unscale_point(&l->scaled, &l->scale, &at, &l->plain);
     const double residual = crm_natural_residual(l->problem, &l->plain, &l->work);
-    if (!(residual < l->best_residual)) return residual;
-    crm_iterate_copy(l, it, l->best);
-    l->best_residual = residual;
+    if (residual < l->best_residual) {
+        crm_iterate_copy(l, it, l->best);
+        l->best_residual = residual;
+    }
+    if (residual < l->lead_residual) {
+        crm_iterate_copy(l, it, l->lead);
+        l->lead_residual = residual;
+    }
     return residual;
 }
 
@@ -94,6 +99,7 @@ static carom_status search(carom_lcp *l)
     const int starts = l->scaled.n_ineq ? l->settings.max_starts : 1;
     for (int k = 0; k < starts && !(l->best_residual <= l->settings.accept); k++) {
         l->stats.starts++;
+        l->lead_residual = HUGE_VAL;
         if (crm_interior_run(l, k) == CAROM_E_MEMORY) return CAROM_E_MEMORY;
         if (crm_polish_run(l) == CAROM_E_MEMORY) return CAROM_E_MEMORY;
     }
@@ -117,7 +123,7 @@ static carom_status solve(carom_lcp *l, const carom_lcp_problem *p, carom_lcp_po
 {
     const carom_lcp_stats none = {CAROM_OK, HUGE_VAL, 0, 0, 0, 0, 0};
     l->stats = none;
-    l->best_residual = HUGE_VAL;
+    l->best_residual = l->lead_residual = HUGE_VAL;
     count_factorizations(l, -1);
     crm_kkt_forget(&l->kkt);
     crm_lcp_load(l, p);
@@ -127,7 +133,9 @@ static carom_status solve(carom_lcp *l, const carom_lcp_problem *p, carom_lcp_po
     const carom_lcp_point best = crm_iterate_point(l, l->best);
     crm_unscale_point(p, &l->scale, &best, &l->plain);
     l->stats.residual = crm_natural_residual(p, &l->plain, &l->work);
-    const carom_status status = judge(l, l->stats.residual);
+    carom_status status = judge(l, l->stats.residual);
+    if (status < 0 && l->settings.certify && crm_certify(&l->certifier, &l->scaled))
+        status = CAROM_E_INFEASIBLE;
     if (status != CAROM_E_SINGULAR) crm_unscale_point(p, &l->scale, &best, out);
     return status;
 }

@@ -3,6 +3,7 @@
 #define CRM_LCP_SOLVER_H
 
 #include "libgeom/base/memory.h"
+#include "libsolver/lcp/certify.h"
 #include "libsolver/lcp/kkt.h"
 #include "libsolver/lcp/residual.h"
 #include "libsolver/lcp/scale.h"
@@ -25,11 +26,14 @@ struct carom_lcp {
     carom_lcp_gradient number; /* the numbers of `scaled`, writable */
     crm_scale scale;
     crm_kkt kkt;
+    crm_certifier certifier; /* zero unless settings.certify */
 
     const carom_lcp_problem *problem; /* the caller's, during a call */
     crm_iterate now;
-    crm_iterate best;
-    double best_residual; /* of `best`, in the caller's numbers; HUGE_VAL: none yet */
+    crm_iterate best;     /* of all that was offered */
+    double best_residual; /* in the caller's numbers; HUGE_VAL: none yet */
+    crm_iterate lead;     /* best of the present start, where polishing begins */
+    double lead_residual;
     carom_lcp_stats stats;
 
     carom_lcp_point plain; /* a point in the caller's coordinates */
@@ -46,7 +50,8 @@ struct carom_lcp {
 /* The parts of an iterate as a point. */
 carom_lcp_point crm_iterate_point(const carom_lcp *l, crm_iterate it);
 void crm_iterate_copy(const carom_lcp *l, crm_iterate from, crm_iterate to);
-/* Natural residual of an iterate in the caller's numbers; keeps it when it is the best so far. */
+/* Natural residual of an iterate in the caller's numbers; keeps it as `best` and as `lead` when it
+ * is better than those. */
 double crm_offer(carom_lcp *l, crm_iterate it);
 
 /* Predictor-corrector interior point from start number `start` (0: Mattingley and Boyd); offers
@@ -54,7 +59,7 @@ double crm_offer(carom_lcp *l, crm_iterate it);
 carom_status crm_interior_run(carom_lcp *l, int start);
 int crm_interior_starts(void);
 
-/* Active sets from l->best: solves with s = 0 or z = 0 per pair, exchanges what is violated. */
+/* Active sets from l->lead: solves with s = 0 or z = 0 per pair, exchanges what is violated. */
 carom_status crm_polish_run(carom_lcp *l);
 
 /* CAROM_OK when p fits the pattern of l, its numbers are finite and M is symmetric; else the status

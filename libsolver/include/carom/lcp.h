@@ -55,6 +55,7 @@ typedef struct carom_lcp_settings {
     int max_starts;     /* 1: Mattingley and Boyd's alone; each further one retries; 1..8; 8 */
     int polish_rounds;  /* active sets tried after each start, >= 0; 12 */
     int equilibrate;    /* 0: solve the numbers as given; 1: scale rows and columns first; 1 */
+    int certify;        /* 1: look for a proof when nothing is found, at five times the memory; 0 */
 } carom_lcp_settings;
 
 CAROM_API carom_lcp_settings carom_lcp_defaults(void);
@@ -91,8 +92,8 @@ CAROM_API void carom_lcp_memory(const carom_lcp *lcp, size_t *bytes, long *calls
  *   CAROM_INEXACT        residual <= inexact
  *   CAROM_E_NO_SOLUTION  `out` holds the best point found, stats its residual (the one exception to
  *                        "outputs untouched")
- *   CAROM_E_INFEASIBLE   no point fulfills even the linear equations with s, z >= 0; shown by a
- *                        certificate (docs/lcp.md); `out` holds the best point
+ *   CAROM_E_INFEASIBLE   no point fulfills even the linear equations with s, z >= 0, as a Farkas
+ *                        certificate shows (settings.certify; docs/lcp.md); `out` as above
  *   CAROM_E_SINGULAR     the linear equations of the method have no solution: x is not determined
  *   CAROM_E_ARGUMENT     a number that is not finite, or M not symmetric to 1e-10
  *   CAROM_E_STATE        another pattern
