@@ -146,7 +146,7 @@ static double *wanted(double *array, int has)
 static carom_gradient gradient_view(const carom_parameter_gradient_t *m)
 {
     const int w = m->wanted;
-    carom_gradient g;
+    carom_gradient g = {0};
     g.q0 = wanted(m->q0, w & CAROM_PARAMETER_GRADIENT_T_Q0);
     g.v0 = wanted(m->v0, w & CAROM_PARAMETER_GRADIENT_T_V0);
     g.mass = wanted(m->mass, w & CAROM_PARAMETER_GRADIENT_T_MASS);
