@@ -6,8 +6,8 @@
 /* Above this condition number the equations count as singular and are solved proximally. */
 static const double SINGULAR_CONDITION = 1e13;
 static const crm_kkt_reg NONE = {0.0, 0.0, 0.0};
-static const crm_kkt_reg PROXIMAL = {1e-9, 1e-9, 1e-9};
-enum { REFINEMENTS = 3, PROXIMAL_REFINEMENTS = 12 };
+static const crm_kkt_reg PROXIMAL = {1e-10, 1e-10, 1e-10};
+enum { REFINEMENTS = 3, PROXIMAL_REFINEMENTS = 40 };
 /* Singular equations have a solution when this part of the right-hand side is left at most: what a
  * right-hand side leaves outside the range stays, of order 1. */
 static const double CONSISTENT = 1e-8;

@@ -13,7 +13,7 @@ static const double REUSE_RCOND = 1e-13;
 static const double SINGULAR_RCOND = 1e-300;
 /* A solve with reused pivots that leaves more than this is repeated with fresh ones. */
 static const double REUSE_RESIDUAL = 1e-10;
-/* Refinement ends when the residual is at rounding level or does not halve. */
+/* Refinement ends when the residual is at rounding level or does not fall. */
 static const double ROUNDING = 2.3e-16;
 
 static void list_entries(const carom_lcp_problem *p, crm_entries *e)
@@ -246,9 +246,7 @@ static double refine(crm_kkt *k, int transposed, int rounds, const double *rhs, 
             for (int i = 0; i < k->n; i++) u[i] -= k->fix[i];
             return residual(k, transposed, rhs, u);
         }
-        const int slow = next > 0.5 * error;
         error = next;
-        if (slow) break;
     }
     return error;
 }
