@@ -58,6 +58,7 @@ static int serve(const crm_daemon_settings *set)
         crm_daemon_tick(d);
         signal_number = sigtimedwait(&ends, NULL, &half_second);
     } while (signal_number < 0 && (errno == EAGAIN || errno == EINTR));
+    crm_daemon_tick(d);
     crm_daemon_destroy(d);
     return 0;
 }

@@ -3,8 +3,6 @@
 
 #include <arpa/inet.h>
 #include <netdb.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -47,12 +45,14 @@ carom_client_info carom_client_last(const carom_client *c)
 static void disconnect(carom_client *c)
 {
     for (int i = 0; i < CRM_N_ANSWERS; i++) {
-        if (c->subscriptions[i]) lcm_unsubscribe(c->lcm, c->subscriptions[i]);
+        /* Over a connection that broke LCM would connect again. */
+        if (c->subscriptions[i] && !c->broken) lcm_unsubscribe(c->lcm, c->subscriptions[i]);
         c->subscriptions[i] = NULL;
     }
     if (c->lcm && c->own) lcm_destroy(c->lcm);
     c->lcm = NULL;
     c->open = 0;
+    c->broken = 0;
 }
 
 void carom_client_destroy(carom_client *c)
@@ -103,7 +103,6 @@ static int listens(const char *url)
 
 static carom_client_code subscribe(carom_client *c, const char *daemon)
 {
-    const int on = 1;
     if (daemon && strlen(daemon) > 32) {
         return crm_client_fail(c, CAROM_CLIENT_E_ARGUMENT, "daemon: at most 32 characters");
     }
@@ -114,8 +113,6 @@ static carom_client_code subscribe(carom_client *c, const char *daemon)
     if (c->fd < 0) {
         return crm_client_fail(c, CAROM_CLIENT_E_NETWORK, "no connection to %s", c->where);
     }
-    /* LCM sends a message in five pieces; Nagle's algorithm would hold them back. */
-    setsockopt(c->fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     for (int i = 0; i < CRM_N_ANSWERS; i++) {
         c->subscriptions[i] =
             lcm_subscribe(c->lcm, c->channels[answers[i]], crm_client_on_message, c);

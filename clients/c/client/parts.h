@@ -54,7 +54,8 @@ typedef struct crm_exchange {
 
 struct carom_client {
     lcm_t *lcm;
-    int own; /* lcm is destroyed with the client */
+    int own;    /* lcm is destroyed with the client */
+    int broken; /* the connection is gone */
     int fd;
     char where[200]; /* for errors */
     char channels[CRM_WIRE_N_TYPES][64];
