@@ -108,7 +108,7 @@ def run(client, mass, clock, record):
 
 
 def loss_and_slope(client, mass, data, clock):
-    """L = mean squared distance of the links' poses from the data, and dL/dlog(mass)."""
+    """L = mean of |pose - data|^2 over links and steps (angle, x, y), and dL/dlog(mass)."""
     scene, poses = run(client, mass, clock, record="restart")
     links = links_of(scene)
     error = np.zeros_like(poses)
@@ -154,7 +154,7 @@ def progress(k, loss, mass):
     """One line that is written over on a terminal, one line an iteration elsewhere."""
     bar = "#" * (20 * (k + 1) // ITERATIONS)
     end = "\r" if sys.stdout.isatty() else "\n"
-    print(f"iteration {k + 1:2d} [{bar:<20}] loss {loss:.3e} m^2  mass {mass:.6f} kg ", end=end,
+    print(f"iteration {k + 1:2d} [{bar:<20}] loss {loss:.3e}  mass {mass:.6f} kg ", end=end,
           flush=True)
 
 
@@ -180,8 +180,8 @@ def picture(path, data, search):
                    label=f"mass {search.masses[i]:.4g} kg")
         draw_scene(axes, scene, data[k], color="#c0392b", fill=False, label="data")
         axes.set_title(f"{word}, t = {(k + 1) * DT:.2f} s")
-        axes.set_xlim(-5.5, 5.5)
-        axes.set_ylim(-6.5, 4.5)
+        axes.set_xlim(-3, 3)
+        axes.set_ylim(-6, 2)
         axes.legend(loc="upper right")
     plot_convergence(figure.add_subplot(grid[0, 2]), figure.add_subplot(grid[1, 2]), search.losses,
                      search.masses, TRUE_MASS, "mass [kg]")

@@ -27,6 +27,7 @@ GROWTH = 1.5
 LONGEST_WAIT = 0.5  # [s]
 PIECE_BYTES = 60000  # larger scenes go in pieces of this size
 PIECES_AT_ONCE = 8
+MOST_RESENT = 1000  # states asked for again in one request
 LARGEST_SCENE = 4 << 20  # [bytes]
 
 ANSWERS = {"CAROM_STATE": state_t, "CAROM_PARAMETER_GRADIENT": parameter_gradient_t,
@@ -132,6 +133,7 @@ class Protocol:
         self._clock = clock
         self._where = where
         self._seq = 0
+        self._settled = 0  # largest seq whose reply set `step`
         self._heard = False
         self.pending: dict[int, Exchange] = {}
 
@@ -169,6 +171,11 @@ class Protocol:
         return message
 
     def _send(self, exchange, now):
+        if exchange.reply is not None and exchange.steps:
+            missing = exchange.missing()[:MOST_RESENT]  # the rest is there, or comes later
+            exchange.message.resend_step = missing
+            exchange.message.num_resend = len(missing)
+            self.resent += len(missing)
         for channel, data in exchange.packets():
             self._publish(channel + self.suffix, data)
         if exchange.sent:
@@ -248,38 +255,31 @@ class Protocol:
         elif code in (reply_t.OK, reply_t.FAILED):
             exchange.reply = reply
             self._complete(exchange)
+            if not exchange.done:  # something that came before the reply was lost
+                exchange.wait = FIRST_WAIT
+                exchange.next_send = min(exchange.next_send, self._clock() + FIRST_WAIT)
         elif code == reply_t.FORGOTTEN:
             self._fail(exchange, SessionLost("the answer is no longer kept by the server"))
         else:
             self._fail(exchange, Refused(reply.reply_text or f"reply code {code}"))
 
     def _complete(self, exchange):
-        """Done when reply, states and answer are there; asks for states that are not."""
+        """Done when reply, states and answer are all there."""
         reply = exchange.reply
-        if reply is None or exchange.done:
+        if reply is None or exchange.done or exchange.missing():
             return
         failed = reply.reply_code == reply_t.FAILED
-        missing = exchange.missing()
-        if missing:
-            self._ask_again(exchange, missing)
-            return
         if exchange.needs and exchange.answer is None and not failed:
             return
-        self.step = reply.step
-        self.first_step = reply.first_step
+        if reply.seq >= self._settled:
+            self._settled = reply.seq
+            self.step = reply.step
+            self.first_step = reply.first_step
         if failed:
             states = [state_of(exchange.states[s]) for s in sorted(exchange.states)]
             self._fail(exchange, ComputationFailed(reply.reply_text, states))
         else:
             self._finish(exchange)
-
-    def _ask_again(self, exchange, missing):
-        if list(exchange.message.resend_step) != missing:
-            exchange.message.resend_step = missing
-            exchange.message.num_resend = len(missing)
-            exchange.wait = FIRST_WAIT
-            exchange.next_send = min(exchange.next_send, self._clock() + FIRST_WAIT)
-            self.resent += len(missing)
 
     def _fill_gap(self, reply):
         """An earlier request did not arrive: it is sent again at once."""
@@ -308,7 +308,7 @@ class Protocol:
         """After a loss: the next scene opens a session of another number, counting from 1."""
         self.session += 1
         self.lost = False
-        self._seq = 0
+        self._seq = self._settled = 0
         self.step = self.planned_step = self.first_step = 0
 
 

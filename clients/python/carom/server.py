@@ -27,6 +27,7 @@ class Server:
         except CaromError:
             self.process.kill()
             self.process.wait()
+            self.process.stdout.close()
             raise
 
     def _wait_ready(self, timeout):
