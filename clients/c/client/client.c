@@ -44,15 +44,16 @@ carom_client_info carom_client_last(const carom_client *c)
 
 static void disconnect(carom_client *c)
 {
+    crm_guard g;
+    crm_client_guard(&g);
     for (int i = 0; i < CRM_N_ANSWERS; i++) {
-        /* Over a connection that broke LCM would connect again. */
-        if (c->subscriptions[i] && !c->broken) lcm_unsubscribe(c->lcm, c->subscriptions[i]);
+        if (c->subscriptions[i]) lcm_unsubscribe(c->lcm, c->subscriptions[i]);
         c->subscriptions[i] = NULL;
     }
     if (c->lcm && c->own) lcm_destroy(c->lcm);
     c->lcm = NULL;
     c->open = 0;
-    c->broken = 0;
+    crm_client_unguard(&g);
 }
 
 void carom_client_destroy(carom_client *c)

@@ -45,23 +45,37 @@ static void cork(const carom_client *c, int on)
 }
 
 /* A connection that broke raises SIGPIPE inside LCM; the program's own signals are left alone. */
-static int publish(carom_client *c, crm_wire_type type, const void *bytes, int size)
+void crm_client_guard(crm_guard *g)
 {
-    sigset_t pipe_signal, before, pending;
-    const struct timespec at_once = {0, 0};
+    sigset_t pipe_signal, pending;
     sigemptyset(&pipe_signal);
     sigaddset(&pipe_signal, SIGPIPE);
     sigpending(&pending);
-    const int was_pending = sigismember(&pending, SIGPIPE);
-    pthread_sigmask(SIG_BLOCK, &pipe_signal, &before);
-    cork(c, 1);
-    const int done = lcm_publish(c->lcm, c->channels[type], bytes, (unsigned)size);
-    cork(c, 0);
-    if (done < 0 && !was_pending) {
+    g->was_pending = sigismember(&pending, SIGPIPE);
+    pthread_sigmask(SIG_BLOCK, &pipe_signal, &g->mask);
+}
+
+void crm_client_unguard(const crm_guard *g)
+{
+    const struct timespec at_once = {0, 0};
+    sigset_t pipe_signal;
+    sigemptyset(&pipe_signal);
+    sigaddset(&pipe_signal, SIGPIPE);
+    if (!g->was_pending) {
         while (sigtimedwait(&pipe_signal, NULL, &at_once) < 0 && errno == EINTR) {
         }
     }
-    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    pthread_sigmask(SIG_SETMASK, &g->mask, NULL);
+}
+
+static int publish(carom_client *c, crm_wire_type type, const void *bytes, int size)
+{
+    crm_guard g;
+    crm_client_guard(&g);
+    cork(c, 1);
+    const int done = lcm_publish(c->lcm, c->channels[type], bytes, (unsigned)size);
+    cork(c, 0);
+    crm_client_unguard(&g);
     return done;
 }
 
@@ -151,7 +165,6 @@ static int wait_for(carom_client *c, double seconds)
 
 static carom_client_code broken(carom_client *c)
 {
-    c->broken = 1;
     return crm_client_fail(c, CAROM_CLIENT_E_NETWORK, "the connection to %s broke", c->where);
 }
 

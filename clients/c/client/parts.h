@@ -14,6 +14,7 @@
 #include "wire.h"
 
 #include <lcm/lcm.h>
+#include <signal.h>
 
 enum {
     CRM_CHUNK_BYTES = 60000,       /* larger scenes go in pieces of this size */
@@ -54,8 +55,7 @@ typedef struct crm_exchange {
 
 struct carom_client {
     lcm_t *lcm;
-    int own;    /* lcm is destroyed with the client */
-    int broken; /* the connection is gone */
+    int own; /* lcm is destroyed with the client */
     int fd;
     char where[200]; /* for errors */
     char channels[CRM_WIRE_N_TYPES][64];
@@ -80,6 +80,14 @@ carom_client_code crm_client_fail(carom_client *c, carom_client_code code, const
     __attribute__((format(printf, 3, 4)));
 
 /* --- exchange.c */
+
+/* Between the two LCM may write to a connection that broke. */
+typedef struct crm_guard {
+    sigset_t mask;
+    int was_pending;
+} crm_guard;
+void crm_client_guard(crm_guard *guard);
+void crm_client_unguard(const crm_guard *guard);
 
 /* Header of the next request. */
 crm_wire_header crm_client_next_header(carom_client *c);
