@@ -44,22 +44,28 @@ static void lattice_core(rng *r, core *c)
     if (kind == 0) c->v[1] = box[2];
 }
 
+static crm_placed placed(const carom_shape *s, double angle, carom_vec2 at)
+{
+    const carom_frame f = {0, 0, cos(angle), sin(angle)};
+    return crm_place(s, &f, at);
+}
+
 static void random_pair(rng *r, int lattice, core *a, core *b, crm_placed *pa, crm_placed *pb)
 {
     if (lattice) {
         lattice_core(r, a);
         lattice_core(r, b);
         const carom_vec2 at = {rng_int(r, 13) - 6, rng_int(r, 13) - 6};
-        *pa = crm_place(&a->shape, 0, (carom_vec2){0, 0});
-        *pb = crm_place(&b->shape, 0, at);
+        *pa = placed(&a->shape, 0, (carom_vec2){0, 0});
+        *pb = placed(&b->shape, 0, at);
         return;
     }
     const double thin = rng_int(r, 4) ? rng_uniform(r, 0.2, 1) : 1e-4;
     random_core(r, 2 + rng_int(r, rng_int(r, 2) ? 4 : MAX_N - 1), thin, a);
     random_core(r, 1 + rng_int(r, rng_int(r, 2) ? 4 : MAX_N), thin, b);
     const carom_vec2 at = {rng_uniform(r, -2.5, 2.5), rng_uniform(r, -2.5, 2.5)};
-    *pa = crm_place(&a->shape, rng_uniform(r, -4, 4), (carom_vec2){0, 0});
-    *pb = crm_place(&b->shape, rng_uniform(r, -4, 4), at);
+    *pa = placed(&a->shape, rng_uniform(r, -4, 4), (carom_vec2){0, 0});
+    *pb = placed(&b->shape, rng_uniform(r, -4, 4), at);
 }
 
 static int same(const crm_closest *x, const crm_closest *y)
@@ -170,8 +176,8 @@ static void thousands_of_vertices(void **state)
     for (int k = 0; k < 50; k++) {
         const double t = 0.37 * k;
         const double d = 2 + 0.04 * (k - 10);
-        const crm_placed a = crm_place(&shape, 0.1 * k, (carom_vec2){0, 0});
-        const crm_placed b = crm_place(&shape, 0.2 * k, crm_vec(d * cos(t), d * sin(t)));
+        const crm_placed a = placed(&shape, 0.1 * k, (carom_vec2){0, 0});
+        const crm_placed b = placed(&shape, 0.2 * k, crm_vec(d * cos(t), d * sin(t)));
         const crm_closest with = crm_closest_features(&a, &b, HUGE_VAL, 0);
         const crm_closest without = crm_closest_features(&a, &b, HUGE_VAL, INT_MAX);
         expect_same("5000 vertices", k, &with, &without);

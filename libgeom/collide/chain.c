@@ -46,7 +46,7 @@ static int turns_left(carom_vec2 from, carom_vec2 to)
     return crm_cross(from, to) > ANGLE_TOL * crm_length(from) * crm_length(to);
 }
 
-static void view_link(const carom_chain *chain, int link, double angle, link_view *k)
+static void view_link(const carom_chain *chain, int link, const carom_frame *f, link_view *k)
 {
     const int n = chain->count;
     const carom_shape whole = carom_chain_shape(chain);
@@ -54,7 +54,7 @@ static void view_link(const carom_chain *chain, int link, double angle, link_vie
     k->index[1] = (link + 1) % n;
     k->v[0] = chain->vertices[k->index[0]];
     k->v[1] = chain->vertices[k->index[1]];
-    k->p = crm_place(&whole, angle, crm_vec(0, 0));
+    k->p = crm_place(&whole, f, crm_vec(0, 0));
     k->joined[0] = chain->closed || link > 0;
     k->joined[1] = chain->closed || link + 2 < n;
     k->p.v = k->v;
@@ -127,8 +127,7 @@ static int is_off(const link_view *k, const crm_placed *b, const carom_manifold 
 /* Along the link's own normal: what of b is over it. */
 static carom_manifold over_face(const link_view *k, const crm_placed *b)
 {
-    crm_closest c = {CRM_FACE_A, 0, crm_support(b, crm_neg(k->normal)), 0, 0};
-    c.gap = crm_height(&k->p, 0, b, c.b);
+    const crm_closest c = crm_face_at(&k->p, 0, b, crm_support(b, crm_neg(k->normal)), 0);
     carom_manifold m = crm_manifold_of(&k->p, b, &c);
     if (is_off(k, b, &m)) m.count = 0;
     return m;
@@ -173,15 +172,16 @@ carom_manifold carom_collide_chain(const carom_chain *chain, int link, carom_pos
                                    const carom_shape *b, carom_pose pose_b, double margin)
 {
     link_view k;
-    view_link(chain, link, pose_a.angle, &k);
-    const crm_placed pb =
-        crm_place(b, pose_b.angle, crm_vec(pose_b.x - pose_a.x, pose_b.y - pose_a.y));
+    const carom_frame fa = carom_frame_at(pose_a);
+    const carom_frame fb = carom_frame_at(pose_b);
+    view_link(chain, link, &fa, &k);
+    const crm_placed pb = crm_place(b, &fb, crm_vec(fb.x - fa.x, fb.y - fa.y));
     const double radii = chain->radius + b->radius;
     const crm_closest c = crm_features(&k.p, &pb, margin + radii);
     if (c.kind == CRM_APART) return crm_no_contact(c.gap - radii);
     carom_manifold m = answer(&k, &pb, &c);
     const carom_shape whole = carom_chain_shape(chain);
-    const crm_placed pa = crm_place(&whole, pose_a.angle, crm_vec(0, 0));
+    const crm_placed pa = crm_place(&whole, &fa, crm_vec(0, 0));
     m.distance = HUGE_VAL;
     for (int i = 0; i < m.count; i++) {
         const carom_recipe r = of_chain(&k, m.points[i].recipe);

@@ -5,13 +5,6 @@
 /* Distances below this are rounding [1], times the coordinates they come from [m]. */
 static const double NEAR_TOL = 1e-13;
 
-double crm_height(const crm_placed *p, int k, const crm_placed *q, int j)
-{
-    const carom_vec2 e = crm_edge(p, k);
-    const carom_vec2 m = crm_right(crm_scale(1.0 / crm_length(e), e));
-    return crm_dot(m, crm_between(p, k, q, j));
-}
-
 static double norm1(carom_vec2 a)
 {
     return fabs(a.x) + fabs(a.y);
@@ -19,12 +12,19 @@ static double norm1(carom_vec2 a)
 
 double crm_noise(const crm_placed *a, int i, const crm_placed *b, int j)
 {
-    return NEAR_TOL * (norm1(crm_arm(a, i)) + norm1(crm_arm(b, j)));
+    return NEAR_TOL * (norm1(a->v[i]) + norm1(b->v[j]));
 }
 
-static double axis_height(const crm_placed *a, const crm_placed *b, crm_axis x)
+crm_closest crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b)
 {
-    return crm_dot(x.d, crm_between(a, x.a, b, x.b));
+    crm_closest r;
+    r.kind = on_b ? CRM_FACE_B : CRM_FACE_A;
+    r.a = on_b ? j : edge;
+    r.b = on_b ? edge : j;
+    r.tied = 0;
+    r.ref = crm_reference_at(p, edge);
+    r.gap = crm_dot(r.ref.m, crm_between(p, edge, q, j));
+    return r;
 }
 
 static crm_axis axis_along(const crm_placed *a, const crm_placed *b, carom_vec2 d)
@@ -33,26 +33,23 @@ static crm_axis axis_along(const crm_placed *a, const crm_placed *b, carom_vec2 
     return x;
 }
 
-/* The walk from an axis, if that is certified and the distance clears rounding. */
-static int walk_clear(const crm_placed *a, const crm_placed *b, crm_axis x, double reach,
-                      crm_closest *out)
+int crm_closest_from(const crm_placed *a, const crm_placed *b, crm_axis x, double reach,
+                     crm_closest *out)
 {
-    const double h = axis_height(a, b, x);
+    const double h = crm_dot(x.d, crm_between(a, x.a, b, x.b));
+    if (!(h > 0)) return 0;
     const double length = crm_length(x.d);
     /* h > 0 by rounding alone is no certificate: from there a walk may end anywhere. */
     if (!(h > crm_noise(a, x.a, b, x.b) * length)) return 0;
     if (h > reach * length) {
-        const crm_closest far = {CRM_APART, x.a, x.b, 0, h / length};
-        *out = far;
+        out->kind = CRM_APART;
+        out->a = x.a;
+        out->b = x.b;
+        out->tied = 0;
+        out->gap = h / length;
         return 1;
     }
     return crm_walk(a, b, x, out) && out->gap > crm_noise(a, out->a, b, out->b);
-}
-
-/* Rough center of a core: halfway between vertex 0 and the one half around. */
-static carom_vec2 middle(const crm_placed *p)
-{
-    return crm_turn(p, crm_scale(0.5, crm_add(p->v[0], p->v[p->n / 2])));
 }
 
 /* The foot of the vertex is on the face's edge, or the other shape's edge at that vertex lies along
@@ -84,9 +81,9 @@ static int walk_lengthwise(const crm_placed *a, const crm_placed *b, const crm_c
     const int k = on_a ? face->a : face->b;
     const int j = on_a ? face->b : face->a;
     if (foot_on_face(p, k, q, j, crm_noise(p, k, q, j))) return 0;
-    const carom_vec2 e = crm_edge(p, k);
-    return walk_clear(a, b, axis_along(a, b, e), reach, out) ||
-           walk_clear(a, b, axis_along(a, b, crm_neg(e)), reach, out);
+    const carom_vec2 e = face->ref.e;
+    return crm_closest_from(a, b, axis_along(a, b, e), reach, out) ||
+           crm_closest_from(a, b, axis_along(a, b, crm_neg(e)), reach, out);
 }
 
 /* From the face of largest separation. */
@@ -96,25 +93,41 @@ static crm_closest from_face(const crm_placed *a, const crm_placed *b, const crm
     crm_closest r;
     const double tol = crm_noise(a, face->a, b, face->b);
     if (face->gap > tol) {
-        const carom_vec2 u =
-            face->kind == CRM_FACE_A ? crm_normal(a, face->a) : crm_neg(crm_normal(b, face->b));
-        if (walk_clear(a, b, axis_along(a, b, u), reach, &r)) return r;
+        const carom_vec2 m = face->ref.m;
+        const crm_axis x = axis_along(a, b, face->kind == CRM_FACE_A ? m : crm_neg(m));
+        if (crm_closest_from(a, b, x, reach, &r)) return r;
     } else if (face->gap >= -tol && walk_lengthwise(a, b, face, reach, &r)) {
         return r;
     }
     return *face;
 }
 
+/* The higher of the two faces tried first, as an axis. */
+static crm_axis axis_of(const crm_side side[2])
+{
+    const int on_b = side[1].height > side[0].height;
+    const crm_side *f = &side[on_b];
+    const carom_vec2 u = crm_normal(f->p, f->edge);
+    const crm_axis on_a = {u, f->edge, f->vertex};
+    const crm_axis flipped = {crm_neg(u), f->vertex, f->edge};
+    return on_b ? flipped : on_a;
+}
+
 crm_closest crm_closest_features(const crm_placed *a, const crm_placed *b, double reach,
                                  int gjk_min_vertices)
 {
-    const carom_vec2 d = crm_add(crm_sub(b->at, a->at), crm_sub(middle(b), middle(a)));
+    const carom_vec2 between = crm_sub(crm_turn(b, crm_middle(b)), crm_turn(a, crm_middle(a)));
+    const carom_vec2 d = crm_add(crm_sub(b->at, a->at), between);
+    crm_axis x = axis_along(a, b, d);
     crm_closest r;
-    if (walk_clear(a, b, axis_along(a, b, d), reach, &r)) return r;
-    crm_axis x;
-    if (a->n + b->n >= gjk_min_vertices && crm_gjk(a, b, d, &x) && walk_clear(a, b, x, reach, &r)) {
+    crm_side side[2];
+    if (crm_closest_from(a, b, x, reach, &r)) return r;
+    crm_sweep_start(a, b, &x, side);
+    if (crm_closest_from(a, b, axis_of(side), reach, &r)) return r;
+    if (a->n + b->n >= gjk_min_vertices && crm_gjk(a, b, d, &x) &&
+        crm_closest_from(a, b, x, reach, &r)) {
         return r;
     }
-    r = crm_sweep(a, b, reach);
+    r = crm_sweep(side, reach);
     return r.kind == CRM_APART ? r : from_face(a, b, &r, reach);
 }

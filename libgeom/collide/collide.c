@@ -3,16 +3,73 @@
 
 #include "collide/manifold.h"
 
-carom_manifold carom_collide(const carom_shape *a, carom_pose pose_a, const carom_shape *b,
-                             carom_pose pose_b, double margin)
+carom_frame carom_frame_at(carom_pose pose)
 {
-    const crm_placed pa = crm_place(a, pose_a.angle, crm_vec(0, 0));
+    const carom_frame f = {pose.x, pose.y, cos(pose.angle), sin(pose.angle)};
+    return f;
+}
+
+/* Kinds of a cache: 0 is an empty one. */
+enum { NOT_KNOWN, VERTICES, FACE_A, FACE_B };
+
+/* The features of last time as an axis, with the support vertices of today. */
+static crm_axis axis_from(const crm_placed *a, const crm_placed *b, const carom_pair_cache *cache)
+{
+    crm_axis x = {{0, 0}, cache->a, cache->b};
+    if (cache->kind == VERTICES) {
+        x.d = crm_between(a, x.a, b, x.b);
+    } else if (cache->kind == FACE_A) {
+        x.d = crm_normal(a, x.a);
+    } else {
+        x.d = crm_neg(crm_normal(b, x.b));
+    }
+    if (cache->kind != FACE_A) x.a = crm_climb(a, crm_turn_back(a, x.d), x.a);
+    if (cache->kind != FACE_B) x.b = crm_climb(b, crm_turn_back(b, crm_neg(x.d)), x.b);
+    return x;
+}
+
+static void keep_features(const crm_closest *c, carom_pair_cache *cache)
+{
+    cache->kind = c->kind == CRM_FACE_A ? FACE_A : c->kind == CRM_FACE_B ? FACE_B : VERTICES;
+    cache->a = c->a;
+    cache->b = c->b;
+}
+
+static crm_closest find_features(const crm_placed *a, const crm_placed *b, double reach,
+                                 carom_pair_cache *cache)
+{
+    crm_closest c;
+    if (!cache || (a->n == 1 && b->n == 1)) return crm_features(a, b, reach);
+    /* Indices that another pair left must not lead outside. */
+    const int usable = cache->kind != NOT_KNOWN && cache->a < a->n && cache->b < b->n;
+    if (usable && crm_closest_from(a, b, axis_from(a, b, cache), reach, &c)) {
+        if (c.kind != CRM_APART) keep_features(&c, cache);
+        return c;
+    }
+    c = crm_features(a, b, reach);
+    keep_features(&c, cache);
+    return c;
+}
+
+carom_manifold carom_collide_frames(const carom_shape *a, const carom_frame *frame_a,
+                                    const carom_shape *b, const carom_frame *frame_b, double margin,
+                                    carom_pair_cache *cache)
+{
+    const crm_placed pa = crm_place(a, frame_a, crm_vec(0, 0));
     const crm_placed pb =
-        crm_place(b, pose_b.angle, crm_vec(pose_b.x - pose_a.x, pose_b.y - pose_a.y));
+        crm_place(b, frame_b, crm_vec(frame_b->x - frame_a->x, frame_b->y - frame_a->y));
     const double radii = a->radius + b->radius;
-    const crm_closest c = crm_features(&pa, &pb, margin + radii);
+    const crm_closest c = find_features(&pa, &pb, margin + radii, cache);
     if (c.kind == CRM_APART) return crm_no_contact(c.gap - radii);
     carom_manifold m = crm_manifold_of(&pa, &pb, &c);
     crm_keep_within(&m, margin);
     return m;
+}
+
+carom_manifold carom_collide(const carom_shape *a, carom_pose pose_a, const carom_shape *b,
+                             carom_pose pose_b, double margin)
+{
+    const carom_frame fa = carom_frame_at(pose_a);
+    const carom_frame fb = carom_frame_at(pose_b);
+    return carom_collide_frames(a, &fa, b, &fb, margin, NULL);
 }

@@ -27,28 +27,12 @@ typedef struct gjk_shape {
     int is_a;
 } gjk_shape;
 
-/* Local maximum of u . v from vertex j: GJK may get a false one on a tie, the certificate may not.
- */
-static int climb_from(const crm_placed *p, carom_vec2 u, int j)
-{
-    double s = crm_dot(u, p->v[j]);
-    const int forward = crm_dot(u, p->v[crm_next(p, j)]) > s;
-    for (int steps = 0; steps < p->n; steps++) {
-        const int k = forward ? crm_next(p, j) : crm_prev(p, j);
-        const double t = crm_dot(u, p->v[k]);
-        if (!(t > s)) break;
-        s = t;
-        j = k;
-    }
-    return j;
-}
-
 static void support(const void *object, const ccd_vec3_t *dir, ccd_vec3_t *out)
 {
     const gjk_shape *s = object;
     const carom_vec2 d = {dir->v[0], dir->v[1]};
     if (s->is_a) s->call->last = d;
-    *s->hint = climb_from(s->p, crm_turn_back(s->p, d), *s->hint);
+    *s->hint = crm_climb(s->p, crm_turn_back(s->p, d), *s->hint);
     const carom_vec2 x = crm_scale(s->scale, crm_sub(crm_arm(s->p, *s->hint), s->origin));
     ccdVec3Set(out, x.x, x.y, dir->v[2] > 0 ? 1.0 : -1.0);
 }

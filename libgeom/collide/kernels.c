@@ -29,13 +29,10 @@ static point_point point_point_at(carom_vec2 u)
 typedef struct edge_point {
     const crm_placed *p;
     const crm_placed *q;
-    carom_vec2 d;   /* position of q - position of p */
-    carom_vec2 e;   /* reference edge */
-    carom_vec2 t;   /* unit tangent */
-    carom_vec2 m;   /* unit normal */
-    carom_vec2 arm; /* the incident point, relative to q's body */
-    carom_vec2 x;   /* from the start of the edge to the incident point */
-    double length;
+    carom_vec2 d;      /* position of q - position of p */
+    crm_reference ref; /* e, t, m */
+    carom_vec2 arm;    /* the incident point, relative to q's body */
+    carom_vec2 x;      /* from the start of the edge to the incident point */
     double h;
     /* clipped only */
     carom_vec2 w;   /* incident edge */
@@ -50,25 +47,21 @@ static carom_vec2 clip(edge_point *k, carom_recipe r)
     const carom_vec2 i = crm_arm(k->q, r.inc);
     k->w = crm_edge(k->q, r.inc);
     k->cut = crm_sub(crm_sub(crm_arm(k->p, end), i), k->d);
-    k->slope = crm_dot(k->e, k->w);
-    k->tau = k->slope != 0 ? crm_dot(k->e, k->cut) / k->slope : 0.0;
+    k->slope = crm_dot(k->ref.e, k->w);
+    k->tau = k->slope != 0 ? crm_dot(k->ref.e, k->cut) / k->slope : 0.0;
     return crm_add_scaled(i, k->tau, k->w);
 }
 
-static edge_point edge_point_at(const crm_placed *p, const crm_placed *q, carom_recipe r)
+static void see_edge_point(const crm_reference *ref, const crm_placed *p, const crm_placed *q,
+                           carom_recipe r, edge_point *k)
 {
-    edge_point k = {0};
-    k.p = p;
-    k.q = q;
-    k.d = crm_sub(q->at, p->at);
-    k.e = crm_edge(p, r.ref);
-    k.length = crm_length(k.e);
-    k.t = crm_scale(1.0 / k.length, k.e);
-    k.m = crm_right(k.t);
-    k.arm = r.kernel == CAROM_EDGE_CLIPPED ? clip(&k, r) : crm_arm(q, r.inc);
-    k.x = crm_add(k.d, crm_sub(k.arm, crm_arm(p, r.ref)));
-    k.h = crm_dot(k.m, k.x);
-    return k;
+    k->p = p;
+    k->q = q;
+    k->d = crm_sub(q->at, p->at);
+    k->ref = *ref;
+    k->arm = r.kernel == CAROM_EDGE_CLIPPED ? clip(k, r) : crm_arm(q, r.inc);
+    k->x = crm_add(k->d, crm_sub(k->arm, crm_arm(p, r.ref)));
+    k->h = crm_dot(ref->m, k->x);
 }
 
 static carom_contact_point eval_point_point(const crm_placed *a, const crm_placed *b,
@@ -84,22 +77,30 @@ static carom_contact_point eval_point_point(const crm_placed *a, const crm_place
     return out;
 }
 
+carom_contact_point crm_contact_on(const crm_reference *ref, const crm_placed *a,
+                                   const crm_placed *b, carom_recipe r, carom_vec2 *normal)
+{
+    edge_point k;
+    see_edge_point(ref, r.flipped ? b : a, r.flipped ? a : b, r, &k);
+    const carom_vec2 arm_p = crm_add_scaled(crm_add(k.arm, k.d), k.p->radius - k.h, ref->m);
+    const carom_vec2 arm_q = crm_add_scaled(k.arm, -k.q->radius, ref->m);
+    carom_contact_point out;
+    *normal = r.flipped ? crm_neg(ref->m) : ref->m;
+    out.arm_a = r.flipped ? arm_q : arm_p;
+    out.arm_b = r.flipped ? arm_p : arm_q;
+    out.gap = k.h - (a->radius + b->radius);
+    out.recipe = r;
+    return out;
+}
+
 carom_contact_point crm_contact_at(const crm_placed *a, const crm_placed *b, carom_recipe r,
                                    carom_vec2 *normal)
 {
     assert(r.ref >= 0 && r.ref < (r.flipped ? b->n : a->n));
     assert(r.inc >= 0 && r.inc < (r.flipped ? a->n : b->n));
     if (r.kernel == CAROM_POINT_POINT) return eval_point_point(a, b, r, normal);
-    const edge_point k = r.flipped ? edge_point_at(b, a, r) : edge_point_at(a, b, r);
-    const carom_vec2 arm_p = crm_add_scaled(crm_add(k.arm, k.d), k.p->radius - k.h, k.m);
-    const carom_vec2 arm_q = crm_add_scaled(k.arm, -k.q->radius, k.m);
-    carom_contact_point out;
-    *normal = r.flipped ? crm_neg(k.m) : k.m;
-    out.arm_a = r.flipped ? arm_q : arm_p;
-    out.arm_b = r.flipped ? arm_p : arm_q;
-    out.gap = k.h - (a->radius + b->radius);
-    out.recipe = r;
-    return out;
+    const crm_reference ref = crm_reference_at(r.flipped ? b : a, r.ref);
+    return crm_contact_on(&ref, a, b, r, normal);
 }
 
 /* x = R v for a vertex or an edge: adds x_bar to the cotangents of the angle and of v. */
@@ -159,8 +160,8 @@ static carom_vec2 clip_vjp(const edge_point *k, carom_recipe r, carom_vec2 q_bar
 {
     const double tau_bar = k->slope != 0 ? crm_dot(q_bar, k->w) / k->slope : 0.0; /* = N_bar */
     const double slope_bar = -k->tau * tau_bar;
-    const carom_vec2 cut_bar = crm_scale(tau_bar, k->e);
-    const carom_vec2 w_bar = crm_add_scaled(crm_scale(k->tau, q_bar), slope_bar, k->e);
+    const carom_vec2 cut_bar = crm_scale(tau_bar, k->ref.e);
+    const carom_vec2 w_bar = crm_add_scaled(crm_scale(k->tau, q_bar), slope_bar, k->ref.e);
     arm_vjp(k->q, r.inc, crm_sub(q_bar, cut_bar), s_bar);
     edge_vjp(k->q, r.inc, w_bar, s_bar);
     arm_vjp(k->p, r.at_end ? crm_next(k->p, r.ref) : r.ref, cut_bar, p_bar);
@@ -175,30 +176,32 @@ static carom_vec2 clip_vjp(const edge_point *k, carom_recipe r, carom_vec2 q_bar
 static void edge_point_vjp(const edge_point *k, carom_recipe r, const carom_contact_bar *g,
                            carom_shape_bar *p_bar, carom_shape_bar *q_bar)
 {
-    const double h_bar = g->gap - crm_dot(k->m, g->arm_a);
+    const double h_bar = g->gap - crm_dot(k->ref.m, g->arm_a);
     carom_vec2 m_bar = crm_add_scaled(g->normal, k->p->radius - k->h, g->arm_a);
     m_bar = crm_add_scaled(m_bar, -k->q->radius, g->arm_b);
     m_bar = crm_add_scaled(m_bar, h_bar, k->x);
-    carom_vec2 e_bar = crm_scale(-crm_dot(k->t, m_bar) / k->length, k->m);
-    const carom_vec2 d_bar = crm_add_scaled(g->arm_a, h_bar, k->m);
+    carom_vec2 e_bar = crm_scale(-crm_dot(k->ref.t, m_bar) / k->ref.length, k->ref.m);
+    const carom_vec2 d_bar = crm_add_scaled(g->arm_a, h_bar, k->ref.m);
     const carom_vec2 point_bar = crm_add(d_bar, g->arm_b);
     if (r.kernel == CAROM_EDGE_CLIPPED) {
         e_bar = crm_add(e_bar, clip_vjp(k, r, point_bar, p_bar, q_bar));
     } else {
         arm_vjp(k->q, r.inc, point_bar, q_bar);
     }
-    arm_vjp(k->p, r.ref, crm_scale(-h_bar, k->m), p_bar);
+    arm_vjp(k->p, r.ref, crm_scale(-h_bar, k->ref.m), p_bar);
     edge_vjp(k->p, r.ref, e_bar, p_bar);
     offset_vjp(d_bar, p_bar, q_bar);
-    p_bar->radius += crm_dot(k->m, g->arm_a) - g->gap;
-    q_bar->radius -= crm_dot(k->m, g->arm_b) + g->gap;
+    p_bar->radius += crm_dot(k->ref.m, g->arm_a) - g->gap;
+    q_bar->radius -= crm_dot(k->ref.m, g->arm_b) + g->gap;
 }
 
 static void place_pair(const carom_shape *a, carom_pose pose_a, const carom_shape *b,
                        carom_pose pose_b, crm_placed *pa, crm_placed *pb)
 {
-    *pa = crm_place(a, pose_a.angle, crm_vec(0, 0));
-    *pb = crm_place(b, pose_b.angle, crm_vec(pose_b.x - pose_a.x, pose_b.y - pose_a.y));
+    const carom_frame fa = carom_frame_at(pose_a);
+    const carom_frame fb = carom_frame_at(pose_b);
+    *pa = crm_place(a, &fa, crm_vec(0, 0));
+    *pb = crm_place(b, &fb, crm_vec(fb.x - fa.x, fb.y - fa.y));
 }
 
 carom_contact_point carom_contact_eval(const carom_shape *a, carom_pose pose_a,
@@ -220,12 +223,17 @@ void carom_contact_vjp(const carom_shape *a, carom_pose pose_a, const carom_shap
     place_pair(a, pose_a, b, pose_b, &pa, &pb);
     if (recipe.kernel == CAROM_POINT_POINT) {
         point_point_vjp(&pa, &pb, recipe, bar, a_bar, b_bar);
-    } else if (recipe.flipped) {
-        const edge_point k = edge_point_at(&pb, &pa, recipe);
+        return;
+    }
+    const crm_placed *p = recipe.flipped ? &pb : &pa;
+    const crm_placed *q = recipe.flipped ? &pa : &pb;
+    const crm_reference ref = crm_reference_at(p, recipe.ref);
+    edge_point k;
+    see_edge_point(&ref, p, q, recipe, &k);
+    if (recipe.flipped) {
         const carom_contact_bar g = {crm_neg(bar->normal), bar->arm_b, bar->arm_a, bar->gap};
         edge_point_vjp(&k, recipe, &g, b_bar, a_bar);
     } else {
-        const edge_point k = edge_point_at(&pa, &pb, recipe);
         edge_point_vjp(&k, recipe, bar, a_bar, b_bar);
     }
 }

@@ -5,7 +5,7 @@
 #ifndef CRM_PLACED_H
 #define CRM_PLACED_H
 
-#include "carom/shape.h"
+#include "carom/collide.h"
 #include "vec.h"
 
 typedef struct crm_placed {
@@ -17,15 +17,9 @@ typedef struct crm_placed {
     carom_vec2 at; /* position of the body - position of A */
 } crm_placed;
 
-static inline crm_placed crm_place(const carom_shape *shape, double angle, carom_vec2 at)
+static inline crm_placed crm_place(const carom_shape *shape, const carom_frame *f, carom_vec2 at)
 {
-    crm_placed p;
-    p.v = shape->vertices;
-    p.n = shape->count;
-    p.radius = shape->radius;
-    p.cos = cos(angle);
-    p.sin = sin(angle);
-    p.at = at;
+    const crm_placed p = {shape->vertices, shape->count, shape->radius, f->cos, f->sin, at};
     return p;
 }
 
@@ -75,20 +69,41 @@ static inline carom_vec2 crm_between(const crm_placed *p, int i, const crm_place
     return crm_add(crm_sub(q->at, p->at), crm_sub(crm_arm(q, j), crm_arm(p, i)));
 }
 
-/* The vertex farthest along d (pair frame); of equal ones the first. */
+/* A point inside the core: halfway between vertex 0 and the one half around. */
+static inline carom_vec2 crm_middle(const crm_placed *p)
+{
+    return crm_scale(0.5, crm_add(p->v[0], p->v[p->n / 2])); /* body frame */
+}
+
+/* The vertex farthest along u, body frame; of equal ones the first. */
+int crm_farthest(const crm_placed *p, carom_vec2 u);
+
+/* The same along d, pair frame. */
 static inline int crm_support(const crm_placed *p, carom_vec2 d)
 {
-    const carom_vec2 u = crm_turn_back(p, d);
-    int best = 0;
-    double top = crm_dot(u, p->v[0]);
-    for (int i = 1; i < p->n; i++) {
-        const double s = crm_dot(u, p->v[i]);
-        if (s > top) {
-            top = s;
-            best = i;
-        }
-    }
-    return best;
+    return p->n > 1 ? crm_farthest(p, crm_turn_back(p, d)) : 0;
+}
+
+/* The farthest vertex along u, body frame, from vertex i: around a convex core u . v rises to one
+ * top and falls, so the first vertex without a higher neighbor is there. */
+int crm_climb(const crm_placed *p, carom_vec2 u, int i);
+
+/* Edge k as a reference. */
+typedef struct crm_reference {
+    carom_vec2 e;
+    double length;
+    carom_vec2 t; /* unit tangent */
+    carom_vec2 m; /* unit outward normal */
+} crm_reference;
+
+static inline crm_reference crm_reference_at(const crm_placed *p, int k)
+{
+    crm_reference r;
+    r.e = crm_edge(p, k);
+    r.length = crm_length(r.e);
+    r.t = crm_scale(1.0 / r.length, r.e);
+    r.m = crm_right(r.t);
+    return r;
 }
 
 #endif

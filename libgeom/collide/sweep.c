@@ -1,100 +1,153 @@
-/* sweep.c: separating axes, all face normals of both cores, with the support vertex carried along.
+/* sweep.c: separating axes: the face of either core over which the other core is highest.
  *
- * Turning the normal counterclockwise turns the support vertex counterclockwise, so one trip around
- * each core costs O(n_a + n_b). */
+ * The height of q over face k of p is min over q of m_k . (q - v_k), so at any one point x of q it
+ * is at most m_k . (x - v_k): a face for which that is below a height already found is passed over.
+ * The bound is sharp where it matters, with x the vertex lowest over a good first face. */
 #include "collide/closest.h"
 
-/* Faces whose separations differ by less are tied [1], times the pair's extent [m]. */
+/* Faces whose heights differ by less are tied [1], times the coordinates [m]. */
 static const double TIE_TOL = 1e-14;
 
-static double extent_of(const crm_placed *p)
+static carom_vec2 turn(const crm_side *f, carom_vec2 v)
 {
-    carom_vec2 low = p->v[0];
-    carom_vec2 high = p->v[0];
-    for (int i = 1; i < p->n; i++) {
-        low.x = fmin(low.x, p->v[i].x);
-        low.y = fmin(low.y, p->v[i].y);
-        high.x = fmax(high.x, p->v[i].x);
-        high.y = fmax(high.y, p->v[i].y);
-    }
-    return fmax(fmax(high.x - low.x, high.y - low.y), p->radius);
+    return crm_vec(f->cos * v.x - f->sin * v.y, f->sin * v.x + f->cos * v.y);
 }
 
-/* Corners that turn less than 84 degrees are blunt: squared cosine.  At 90 degrees a rounding of
- * the normal decides whether an edge of the other core lies flat at the top. */
-static const double BLUNT = 0.01;
+static carom_vec2 turn_back(const crm_side *f, carom_vec2 v)
+{
+    return crm_vec(f->cos * v.x + f->sin * v.y, f->cos * v.y - f->sin * v.x);
+}
+
+/* A point of q's body in p's frame. */
+static carom_vec2 seen(const crm_side *f, carom_vec2 v)
+{
+    return crm_add(f->at, turn(f, v));
+}
+
+/* Outward normal of edge k, as long as the edge. */
+static carom_vec2 normal(const crm_side *f, int k)
+{
+    return crm_right(crm_sub(f->p->v[crm_next(f->p, k)], f->p->v[k]));
+}
+
+static double height(const crm_side *f, int k, int *vertex)
+{
+    const carom_vec2 u = normal(f, k);
+    *vertex = f->q->n > 1 ? crm_farthest(f->q, turn_back(f, crm_neg(u))) : 0;
+    const carom_vec2 x = crm_sub(seen(f, f->q->v[*vertex]), f->p->v[k]);
+    return crm_dot(u, x) / crm_length(u);
+}
+
+/* Of the two faces at vertex i of p the one that looks more toward x. */
+static int facing(const crm_side *f, int i, carom_vec2 x)
+{
+    const int before = crm_prev(f->p, i);
+    const carom_vec2 u = normal(f, before);
+    const carom_vec2 v = normal(f, i);
+    const carom_vec2 y = crm_sub(x, f->p->v[i]);
+    const double su = crm_dot(u, y);
+    const double sv = crm_dot(v, y);
+    return su * fabs(su) * crm_dot(v, v) > sv * fabs(sv) * crm_dot(u, u) ? before : i;
+}
+
+static crm_side side_of(const crm_placed *p, const crm_placed *q, int i, int j)
+{
+    crm_side f;
+    f.p = p;
+    f.q = q;
+    f.cos = p->cos * q->cos + p->sin * q->sin;
+    f.sin = p->cos * q->sin - p->sin * q->cos;
+    f.at = crm_turn_back(p, crm_sub(q->at, p->at));
+    f.height = -HUGE_VAL;
+    f.edge = 0;
+    f.vertex = j;
+    if (p->n > 1) {
+        f.edge = facing(&f, i, seen(&f, q->v[j]));
+        f.height = height(&f, f.edge, &f.vertex);
+    }
+    return f;
+}
+
+void crm_sweep_start(const crm_placed *a, const crm_placed *b, const crm_axis *x, crm_side side[2])
+{
+    side[0] = side_of(a, b, x->a, x->b);
+    side[1] = side_of(b, a, x->b, x->a);
+}
+
+static double coordinates(const crm_placed *p)
+{
+    double top = p->radius;
+    for (int i = 0; i < p->n; i++) {
+        const double x = fabs(p->v[i].x);
+        const double y = fabs(p->v[i].y);
+        if (x > top) top = x;
+        if (y > top) top = y;
+    }
+    return top;
+}
 
 typedef struct best_face {
     double height;
-    double second; /* of the other faces, A's and B's */
+    double second; /* of the other faces, A's and B's: a bound from above */
+    double least;  /* faces that cannot reach this are passed over */
     int edge;
     int vertex;
     int on_b;
 } best_face;
 
-static void offer(best_face *best, double height, double tie, int edge, int vertex, int on_b)
+static void offer(best_face *best, double h, double tie, int edge, int vertex, int on_b)
 {
-    if (height > best->height + tie) {
-        best->second = fmax(best->second, best->height);
-        best->height = height;
+    if (h > best->height + tie) {
+        best->second = best->second > best->height ? best->second : best->height;
+        best->height = h;
         best->edge = edge;
         best->vertex = vertex;
         best->on_b = on_b;
-    } else {
-        best->second = fmax(best->second, height);
+        if (h - tie > best->least) best->least = h - tie;
+    } else if (h > best->second) {
+        best->second = h;
     }
 }
 
-/* The lowest vertex of q along u (frame of q's body), climbing counterclockwise from j. */
-static int climb(const crm_placed *q, carom_vec2 u, int j)
+/* b / |u| < least, for a bound b times |u|, without the root. */
+static int is_below(double b, double uu, double least)
 {
-    double s = crm_dot(u, q->v[j]);
-    for (int steps = 0; steps < q->n; steps++) {
-        const int k = crm_next(q, j);
-        const double t = crm_dot(u, q->v[k]);
-        if (!(t < s)) break;
-        s = t;
-        j = k;
-    }
-    return j;
+    if (least >= 0) return b < 0 || b * b < least * least * uu;
+    return b < 0 && b * b > least * least * uu;
 }
 
-/* All faces of p against q.  Returns 1 when one separates by more than reach. */
-static int sweep_faces(const crm_placed *p, const crm_placed *q, int on_b, double tie, double reach,
-                       best_face *best)
+static void sweep_faces(const crm_side *f, int on_b, double tie, best_face *best)
 {
-    carom_vec2 before = {0, 0};
-    int j = 0;
-    for (int k = 0; p->n > 1 && k < p->n; k++) {
-        const carom_vec2 u = crm_normal(p, k);
-        /* Past a sharp corner the climb would start near the top, where it could stall. */
-        const double turn = crm_dot(before, u);
-        if (turn > 0 && turn * turn > BLUNT * crm_dot(before, before) * crm_dot(u, u)) {
-            j = climb(q, crm_turn_back(q, u), j);
-        } else {
-            j = crm_support(q, crm_neg(u));
+    const crm_placed *p = f->p;
+    if (p->n == 1) return;
+    const carom_vec2 x = seen(f, f->q->v[f->vertex]);
+    for (int k = 0; k < p->n; k++) {
+        const carom_vec2 u = normal(f, k);
+        const double bound = crm_dot(u, crm_sub(x, p->v[k]));
+        int j = f->vertex;
+        double h = f->height;
+        if (k != f->edge) {
+            if (is_below(bound, crm_dot(u, u), best->least)) continue;
+            h = height(f, k, &j);
         }
-        before = u;
-        const double height = crm_dot(u, crm_between(p, k, q, j)) / crm_length(u);
-        offer(best, height, tie, k, j, on_b);
-        if (height > reach) return 1;
+        offer(best, h, tie, k, j, on_b);
     }
-    return 0;
 }
 
-crm_closest crm_sweep(const crm_placed *a, const crm_placed *b, double reach)
+crm_closest crm_sweep(const crm_side side[2], double reach)
 {
-    const double tie = TIE_TOL * fmax(extent_of(a), extent_of(b));
-    best_face best = {-HUGE_VAL, -HUGE_VAL, 0, 0, 0};
-    crm_closest r = {CRM_APART, 0, 0, 0, 0};
-    if (!sweep_faces(a, b, 0, tie, reach, &best) && !sweep_faces(b, a, 1, tie, reach, &best)) {
-        r.kind = best.on_b ? CRM_FACE_B : CRM_FACE_A;
-    }
-    r.a = best.on_b ? best.vertex : best.edge;
-    r.b = best.on_b ? best.edge : best.vertex;
+    const crm_placed *a = side[0].p;
+    const crm_placed *b = side[0].q;
+    const double ca = coordinates(a);
+    const double cb = coordinates(b);
+    const double tie = TIE_TOL * (ca > cb ? ca : cb);
+    const double known = side[0].height > side[1].height ? side[0].height : side[1].height;
+    best_face best = {-HUGE_VAL, -HUGE_VAL, known - 2 * tie, 0, 0, 0};
+    sweep_faces(&side[0], 0, tie, &best);
+    sweep_faces(&side[1], 1, tie, &best);
+    crm_closest r = best.on_b ? crm_face_at(b, best.edge, a, best.vertex, 1)
+                              : crm_face_at(a, best.edge, b, best.vertex, 0);
     r.tied = best.second >= best.height - tie;
-    r.gap = best.height;
-    if (r.kind == CRM_FACE_A) r.gap = crm_height(a, r.a, b, r.b);
-    if (r.kind == CRM_FACE_B) r.gap = crm_height(b, r.b, a, r.a);
+    if (r.gap > reach) r.kind = CRM_APART;
     return r;
 }

@@ -56,6 +56,30 @@ typedef struct carom_manifold {
 CAROM_API carom_manifold carom_collide(const carom_shape *a, carom_pose pose_a,
                                        const carom_shape *b, carom_pose pose_b, double margin);
 
+/* A pose with its rotation worked out: once per body instead of once per pair. */
+typedef struct carom_frame {
+    double x; /* [m] */
+    double y; /* [m] */
+    double cos;
+    double sin;
+} carom_frame;
+
+CAROM_API carom_frame carom_frame_at(carom_pose pose);
+
+/* Where a pair was closest: where to look first next time.  All zero: not known yet. */
+typedef struct carom_pair_cache {
+    int kind;
+    int a;
+    int b;
+} carom_pair_cache;
+
+/* carom_collide from frames.  cache (may be NULL) is read and written; whatever it holds of this
+ * pair of shapes, points and distance are the same bit for bit; only the bound given with count = 0
+ * may be another. */
+CAROM_API carom_manifold carom_collide_frames(const carom_shape *a, const carom_frame *frame_a,
+                                              const carom_shape *b, const carom_frame *frame_b,
+                                              double margin, carom_pair_cache *cache);
+
 /* The point and normal that a recipe gives at these poses (no search).  recipe: from carom_collide
  * on shapes with the same numbers of vertices.  Where the formula has no value (two vertices at one
  * place, an incident edge square to the reference edge) the normal is (1, 0), or the clipped point
