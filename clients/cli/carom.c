@@ -1,13 +1,14 @@
 /* carom: the command line.  docs/cli.md is its manual. */
 #include "carom/world.h"
+#include "clients/c/scene_client.h"
 #include "cmd.h"
 
 #include <stdio.h>
 #include <string.h>
 
-static const crm_command *const commands[] = {&crm_command_run,     &crm_command_gradient,
-                                              &crm_command_explain, &crm_command_validate,
-                                              &crm_command_contact, &crm_command_lcp};
+static const crm_command *const commands[] = {
+    &crm_command_run,     &crm_command_gradient, &crm_command_explain, &crm_command_validate,
+    &crm_command_contact, &crm_command_lcp,      &crm_command_send,    &crm_command_watch};
 enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
 
 static const crm_command *find_command(const char *name)
@@ -31,15 +32,12 @@ static void print_usage(FILE *f)
           f);
 }
 
-/* The default as it is written in a file: the first word of the text where only words are taken. */
 static void print_setting(const char *name, double value, const char *unit, const char *text)
 {
-    carom_world_settings probe = carom_world_defaults();
     char preset[32];
-    snprintf(preset, sizeof preset, "%.6g", value);
-    if (carom_world_settings_set(&probe, name, preset, NULL) < 0) {
-        snprintf(preset, sizeof preset, "%.*s", (int)strcspn(text, ", "), text);
-    }
+    crm_setting_text(name, value, text, preset, sizeof preset);
+    double x = 0;
+    if (sscanf(preset, "%lf", &x) == 1) snprintf(preset, sizeof preset, "%.6g", x);
     printf("  %-20s %-10s %-11s %s\n", name, preset, unit[0] ? unit : "-", text);
 }
 

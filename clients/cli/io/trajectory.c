@@ -24,6 +24,7 @@ void crm_summary_add(crm_summary *summary, const carom_step_stats *stats, double
     summary->joint_drift_max = fmax(summary->joint_drift_max, stats->joint_drift);
     summary->events += stats->n_events;
     summary->factorizations += stats->factorizations;
+    if (summary->allocations_steady < 0) return;
     const int record = summary->steps == 1 || stats->n_contacts > summary->contacts_max ||
                        stats->n_candidates > summary->candidates_max;
     if (!record) summary->allocations_steady += stats->allocations;
@@ -85,6 +86,7 @@ void crm_put_summary(crm_output *out, const crm_summary *summary)
     crm_put_field(out, 0, "factorizations", (double)summary->factorizations);
     crm_put_key(out, 0, "status");
     put_statuses(out, summary);
-    crm_put_field(out, 0, "allocations_steady", (double)summary->allocations_steady);
+    const long allocations = summary->allocations_steady;
+    crm_put_field(out, 0, "allocations_steady", allocations < 0 ? HUGE_VAL : (double)allocations);
     crm_put_raw(out, "}}\n");
 }

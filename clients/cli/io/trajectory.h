@@ -17,7 +17,8 @@ typedef struct crm_summary {
     long events;
     long factorizations;
     long status[CRM_STATUS_KINDS]; /* steps that ended so, in the order of CAROM_STATUS_TABLE */
-    long allocations_steady; /* requests in steps with no new record of contacts or candidates */
+    long allocations_steady; /* requests in steps with no new record of contacts or candidates; < 0:
+                                not counted, written as null */
     int contacts_max;
     int candidates_max;
 } crm_summary;
