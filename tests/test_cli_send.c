@@ -1,0 +1,161 @@
+/* `carom send` and `carom watch` with a real caromd: the same numbers as `carom run`. */
+#include "program.h"
+
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+/* A caromd of this test. */
+typedef struct server {
+    pid_t pid;
+    char url[64];
+} server;
+
+static server start_server(void)
+{
+    int ends[2];
+    server s;
+    assert_int_equal(pipe(ends), 0);
+    s.pid = fork();
+    assert_true(s.pid >= 0);
+    if (s.pid == 0) {
+        dup2(ends[1], STDOUT_FILENO);
+        close(ends[0]);
+        close(ends[1]);
+        execl(CAROM_DAEMON, "caromd", "--hub", "127.0.0.1:0", (char *)NULL);
+        _exit(99);
+    }
+    close(ends[1]);
+    FILE *f = fdopen(ends[0], "r");
+    assert_non_null(f);
+    if (fscanf(f, "ready %63s", s.url) != 1) fail_msg("caromd did not get ready");
+    fclose(f);
+    return s;
+}
+
+static void stop_server(server *s)
+{
+    int status = 0;
+    kill(s->pid, SIGTERM);
+    assert_int_equal(waitpid(s->pid, &status, 0), s->pid);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
+/* Everything before the summary, whose times differ. */
+static void cut_summary(char *text)
+{
+    char *summary = strstr(text, "{\"summary\"");
+    assert_non_null(summary);
+    *summary = '\0';
+}
+
+static void compare_with_run(const server *s, const char *arguments)
+{
+    char line[512];
+    snprintf(line, sizeof line, "run %s", arguments);
+    program_call local = program_run(line);
+    snprintf(line, sizeof line, "send %s --url %s", arguments, s->url);
+    program_call remote = program_run(line);
+    if (local.code != 0 || remote.code != 0) fail_msg("%s: %s", arguments, remote.err);
+    json_t *a = program_line(local.out, program_count_lines(local.out) - 1);
+    json_t *b = program_line(remote.out, program_count_lines(remote.out) - 1);
+    const json_t *sa = json_object_get(a, "summary");
+    const json_t *sb = json_object_get(b, "summary");
+    const char *const same[] = {"steps",           "residual_max", "penetration_max",
+                                "joint_drift_max", "events",       "factorizations"};
+    for (size_t k = 0; k < sizeof same / sizeof same[0]; k++) {
+        assert_true(program_number(sa, same[k]) == program_number(sb, same[k]));
+    }
+    cut_summary(local.out);
+    cut_summary(remote.out);
+    assert_string_equal(local.out, remote.out);
+    json_decref(a);
+    json_decref(b);
+    program_free(&local);
+    program_free(&remote);
+}
+
+static void send_gives_what_run_gives(void **state)
+{
+    (void)state;
+    server s = start_server();
+    compare_with_run(&s, "%/scenes/e_cradle.json");
+    compare_with_run(&s, "%/scenes/g_stack10.json --dt 0.01 --set combine_friction=max --quiet");
+    program_write(
+        "push.json",
+        "{\"format\":\"carom-scene/1\",\"dt\":0.01,\"duration\":6,\"sample\":0.1,"
+        "\"bodies\":[{\"mass\":2,\"inertia\":1,\"forces\":[[0.255,0,3,0],[5.5,1,0,2]]}]}");
+    compare_with_run(&s, "push.json");
+    stop_server(&s);
+}
+
+static void send_tells_what_went_wrong(void **state)
+{
+    (void)state;
+    server s = start_server();
+    char line[512];
+    snprintf(line, sizeof line,
+             "send %%/scenes/a_slide.json --set accept=1e-300 --set inexact=1e-300 --url %s",
+             s.url);
+    program_call c = program_run(line);
+    assert_int_equal(c.code, 2);
+    assert_non_null(strstr(c.err, "a_slide.json: "));
+    assert_non_null(strstr(c.err, "step 1"));
+    program_free(&c);
+    stop_server(&s);
+    snprintf(line, sizeof line, "send %%/scenes/a_slide.json --url %s", s.url);
+    c = program_run(line);
+    assert_int_equal(c.code, 2);
+    assert_non_null(strstr(c.err, "nothing listens at"));
+    program_free(&c);
+    snprintf(line, sizeof line, "watch --url %s", s.url);
+    c = program_run(line);
+    assert_int_equal(c.code, 2);
+    assert_non_null(strstr(c.err, "no connection to"));
+    program_free(&c);
+    program_refuses("watch here", "one argument too many");
+    program_refuses("watch --for x", "--for: \"x\" is not a number");
+}
+
+/* Heartbeats come twice a second; a run beside it is heard. */
+static void watch_hears_the_bus(void **state)
+{
+    (void)state;
+    server s = start_server();
+    char line[512];
+    snprintf(line, sizeof line, "watch --url %s --count 2", s.url);
+    program_call c = program_run(line);
+    assert_int_equal(c.code, 0);
+    assert_int_equal(program_count_lines(c.out), 2);
+    json_t *first = program_line(c.out, 0);
+    const json_t *status = json_object_get(first, "status");
+    assert_string_equal(json_string_value(json_object_get(status, "url")), s.url);
+    json_decref(first);
+    program_free(&c);
+    snprintf(line, sizeof line,
+             "watch --url %s --for 1.5 --out heard & sleep 0.5; %s send %%/scenes/f_pendulum.json "
+             "--url %s --out sent; wait",
+             s.url, CAROM_PROGRAM, s.url);
+    c = program_run(line);
+    assert_int_equal(c.code, 0);
+    char *heard = program_read("heard");
+    assert_non_null(strstr(heard, "{\"state\":{\"client_id\":"));
+    assert_non_null(strstr(heard, "\"step\":300,"));
+    assert_non_null(strstr(heard, "{\"reply\":{\"client_id\":"));
+    free(heard);
+    program_free(&c);
+    stop_server(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(send_gives_what_run_gives),
+        cmocka_unit_test(send_tells_what_went_wrong),
+        cmocka_unit_test(watch_hears_the_bus),
+    };
+    return cmocka_run_group_tests(tests, program_make_folder, program_remove_folder);
+}
