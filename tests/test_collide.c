@@ -26,6 +26,7 @@ static const carom_vec2 BOX[4] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
 static const carom_vec2 SMALL[4] = {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}};
 static const carom_vec2 GROUND[4] = {{-50, -1}, {50, -1}, {50, 0}, {-50, 0}};
 static const carom_vec2 LEVEL[2] = {{-1, 0}, {1, 0}};
+static const carom_vec2 FROM_ORIGIN[2] = {{0, 0}, {4, 0}};
 static const carom_vec2 UPRIGHT[2] = {{0, -1}, {0, 1}};
 static const carom_vec2 TRIANGLE[3] = {{0, 0}, {1, 1}, {-1, 1}};
 /* 1e-11 high: near the smallest that carom_shape_check accepts. */
@@ -75,6 +76,8 @@ static const named CASES[] = {
     /* capsules and segments */
     {"circle at a segment's end, in line", HULL(LEVEL), {0, 0, 0}, DISC(0.5), {0, 3, 0}, 1.5, {1,
      0}, 0, 1, {{1, 0, 2.5, 0}}},
+    {"segment from its body's position on, aslant", HULL(FROM_ORIGIN), {0.6435011087932844, 0, 0},
+     DISC(1), {0, 4, 0}, 1.4, {0.6, -0.8}, 0, 1, {{2.56, 1.92, 3.4, 0.8}}},
     {"center on a segment", HULL(LEVEL), {0, 0, 0}, DISC(0.5), {0, 0.25, 0}, -0.5, {0, -1}, 1, 1,
      {{0.25, 0, 0.25, 0.5}}},
     {"segments in line, apart", HULL(LEVEL), {0, 0, 0}, HULL(LEVEL), {0, 3, 0}, 1, {1, 0}, 0, 1,

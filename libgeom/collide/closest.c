@@ -5,6 +5,9 @@
 /* Distances below this are rounding [1], times the coordinates they come from [m]. */
 static const double NEAR_TOL = 1e-13;
 
+/* Heights of faces that differ by less are tied [1], times the coordinates [m]. */
+static const double TIE_TOL = 1e-14;
+
 static double norm1(carom_vec2 a)
 {
     return fabs(a.x) + fabs(a.y);
@@ -13,6 +16,19 @@ static double norm1(carom_vec2 a)
 double crm_noise(const crm_placed *a, int i, const crm_placed *b, int j)
 {
     return NEAR_TOL * (norm1(a->v[i]) + norm1(b->v[j]));
+}
+
+static double coordinates(const crm_placed *p)
+{
+    const double x = 0.5 * (norm1(p->v[0]) + norm1(p->v[p->n / 2]));
+    return x > p->radius ? x : p->radius;
+}
+
+double crm_tie(const crm_placed *a, const crm_placed *b)
+{
+    const double x = coordinates(a);
+    const double y = coordinates(b);
+    return TIE_TOL * (x > y ? x : y);
 }
 
 crm_closest crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b)
@@ -94,7 +110,7 @@ static crm_closest from_face(const crm_placed *a, const crm_placed *b, const crm
     const double tol = crm_noise(a, face->a, b, face->b);
     if (face->gap > tol) {
         const carom_vec2 m = face->ref.m;
-        const crm_axis x = axis_along(a, b, face->kind == CRM_FACE_A ? m : crm_neg(m));
+        const crm_axis x = {face->kind == CRM_FACE_A ? m : crm_neg(m), face->a, face->b};
         if (crm_closest_from(a, b, x, reach, &r)) return r;
     } else if (face->gap >= -tol && walk_lengthwise(a, b, face, reach, &r)) {
         return r;
@@ -102,32 +118,22 @@ static crm_closest from_face(const crm_placed *a, const crm_placed *b, const crm
     return *face;
 }
 
-/* The higher of the two faces tried first, as an axis. */
-static crm_axis axis_of(const crm_side side[2])
-{
-    const int on_b = side[1].height > side[0].height;
-    const crm_side *f = &side[on_b];
-    const carom_vec2 u = crm_normal(f->p, f->edge);
-    const crm_axis on_a = {u, f->edge, f->vertex};
-    const crm_axis flipped = {crm_neg(u), f->vertex, f->edge};
-    return on_b ? flipped : on_a;
-}
-
 crm_closest crm_closest_features(const crm_placed *a, const crm_placed *b, double reach,
                                  int gjk_min_vertices)
 {
-    const carom_vec2 between = crm_sub(crm_turn(b, crm_middle(b)), crm_turn(a, crm_middle(a)));
-    const carom_vec2 d = crm_add(crm_sub(b->at, a->at), between);
-    crm_axis x = axis_along(a, b, d);
+    const int few = a->n <= CRM_FEW && b->n <= CRM_FEW;
+    const int n = a->n + b->n;
     crm_closest r;
-    crm_side side[2];
-    if (crm_closest_from(a, b, x, reach, &r)) return r;
-    crm_sweep_start(a, b, &x, side);
-    if (crm_closest_from(a, b, axis_of(side), reach, &r)) return r;
-    if (a->n + b->n >= gjk_min_vertices && crm_gjk(a, b, d, &x) &&
-        crm_closest_from(a, b, x, reach, &r)) {
-        return r;
+    crm_axis x;
+    if (!few || n >= gjk_min_vertices) {
+        const carom_vec2 between = crm_sub(crm_turn(b, crm_middle(b)), crm_turn(a, crm_middle(a)));
+        x = axis_along(a, b, crm_add(crm_sub(b->at, a->at), between));
+        if (crm_closest_from(a, b, x, reach, &r)) return r;
     }
-    r = crm_sweep(side, reach);
+    if (n >= gjk_min_vertices) {
+        crm_axis y;
+        if (crm_gjk(a, b, x.d, &y) && crm_closest_from(a, b, y, reach, &r)) return r;
+    }
+    r = few ? crm_sweep_few(a, b, reach) : crm_sweep(a, b, &x, reach);
     return r.kind == CRM_APART ? r : from_face(a, b, &r, reach);
 }

@@ -41,26 +41,18 @@ typedef struct crm_axis {
  * 0: not found, the certificate was rounding. */
 int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closest *out);
 
-/* One core's faces against the other core, in the frame of the first one's body. */
-typedef struct crm_side {
-    const crm_placed *p;
-    const crm_placed *q;
-    double cos; /* from q's frame to p's */
-    double sin;
-    carom_vec2 at; /* q's position */
-    int edge;      /* the face tried first, */
-    int vertex;    /* q's vertex lowest over it */
-    double height; /* and its separation */
-} crm_side;
+/* The face of largest separation, O(n_a + n_b); the distance when the cores overlap.  Of the faces
+ * within 1e-14 of the coordinates of that, the first is taken, A's before B's.  x: any axis with
+ * its support vertices, to begin with.  CRM_APART: a face separates by more than reach.  Not both
+ * may be points. */
+crm_closest crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach);
 
-/* Two of the faces at the support vertices of an axis, one of A and one of B, with their heights.
- * Not both may be points. */
-void crm_sweep_start(const crm_placed *a, const crm_placed *b, const crm_axis *x, crm_side side[2]);
+/* The same where neither core has more than CRM_FEW vertices. */
+enum { CRM_FEW = 8 };
+crm_closest crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach);
 
-/* The face of largest separation, O(n_a + n_b); the distance when the cores overlap.  Faces within
- * 1e-14 of the coordinates are tied: the first wins, A's before B's.  CRM_APART: it separates by
- * more than reach. */
-crm_closest crm_sweep(const crm_side side[2], double reach);
+/* Faces whose heights differ by less are tied [m]. */
+double crm_tie(const crm_placed *a, const crm_placed *b);
 
 /* libccd's GJK.  1: it says disjoint and *axis is its last direction with our support vertices, yet
  * to be certified by the caller. */
@@ -69,7 +61,7 @@ int crm_gjk(const crm_placed *a, const crm_placed *b, carom_vec2 first, crm_axis
 /* ------------------------------------------------------------------------------------------- */
 
 /* Pairs with fewer vertices skip GJK.  A setting of speed: the answer does not depend on it. */
-enum { CRM_GJK_MIN_VERTICES = 24 };
+enum { CRM_GJK_MIN_VERTICES = 256 };
 
 /* reach [m]: give up (CRM_APART) when farther; HUGE_VAL: never.  Not both may be points. */
 crm_closest crm_closest_features(const crm_placed *a, const crm_placed *b, double reach,

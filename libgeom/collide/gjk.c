@@ -49,7 +49,10 @@ static double reach_of(const crm_placed *p)
 {
     double top = 0.0;
     for (int i = 1; i < p->n; i++) {
-        top = fmax(top, fmax(fabs(p->v[i].x - p->v[0].x), fabs(p->v[i].y - p->v[0].y)));
+        const double x = fabs(p->v[i].x - p->v[0].x);
+        const double y = fabs(p->v[i].y - p->v[0].y);
+        if (x > top) top = x;
+        if (y > top) top = y;
     }
     return top;
 }

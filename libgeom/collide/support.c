@@ -10,10 +10,8 @@ static int scan(const crm_placed *p, carom_vec2 u)
     double top = crm_dot(u, p->v[0]);
     for (int i = 1; i < p->n; i++) {
         const double s = crm_dot(u, p->v[i]);
-        if (s > top) {
-            top = s;
-            best = i;
-        }
+        best = s > top ? i : best;
+        top = s > top ? s : top;
     }
     return best;
 }

@@ -5,54 +5,65 @@
  * The bound is sharp where it matters, with x the vertex lowest over a good first face. */
 #include "collide/closest.h"
 
-/* Faces whose heights differ by less are tied [1], times the coordinates [m]. */
-static const double TIE_TOL = 1e-14;
+/* One core's faces against the other core, in the frame of the first one's body. */
+typedef struct faces {
+    const crm_placed *p;
+    const crm_placed *q;
+    double cos; /* from q's frame to p's */
+    double sin;
+    carom_vec2 at; /* q's position */
+    int edge;      /* the face tried first, */
+    int vertex;    /* q's vertex lowest over it */
+    double height; /* and its height */
+} faces;
 
-static carom_vec2 turn(const crm_side *f, carom_vec2 v)
-{
-    return crm_vec(f->cos * v.x - f->sin * v.y, f->sin * v.x + f->cos * v.y);
-}
-
-static carom_vec2 turn_back(const crm_side *f, carom_vec2 v)
+static carom_vec2 turn_back(const faces *f, carom_vec2 v)
 {
     return crm_vec(f->cos * v.x + f->sin * v.y, f->cos * v.y - f->sin * v.x);
 }
 
 /* A point of q's body in p's frame. */
-static carom_vec2 seen(const crm_side *f, carom_vec2 v)
+static carom_vec2 seen(const faces *f, carom_vec2 v)
 {
-    return crm_add(f->at, turn(f, v));
+    return crm_vec(f->at.x + (f->cos * v.x - f->sin * v.y),
+                   f->at.y + (f->sin * v.x + f->cos * v.y));
 }
 
 /* Outward normal of edge k, as long as the edge. */
-static carom_vec2 normal(const crm_side *f, int k)
+static carom_vec2 normal(const faces *f, int k)
 {
     return crm_right(crm_sub(f->p->v[crm_next(f->p, k)], f->p->v[k]));
 }
 
-static double height(const crm_side *f, int k, int *vertex)
+static double height(const faces *f, int k, int *vertex)
 {
     const carom_vec2 u = normal(f, k);
-    *vertex = f->q->n > 1 ? crm_farthest(f->q, turn_back(f, crm_neg(u))) : 0;
+    if (f->q->n > 1) *vertex = crm_climb(f->q, turn_back(f, crm_neg(u)), *vertex);
     const carom_vec2 x = crm_sub(seen(f, f->q->v[*vertex]), f->p->v[k]);
     return crm_dot(u, x) / crm_length(u);
 }
 
+/* b |b|, in the order of b. */
+static double signed_square(double b)
+{
+    return b * fabs(b);
+}
+
 /* Of the two faces at vertex i of p the one that looks more toward x. */
-static int facing(const crm_side *f, int i, carom_vec2 x)
+static int facing(const faces *f, int i, carom_vec2 x)
 {
     const int before = crm_prev(f->p, i);
     const carom_vec2 u = normal(f, before);
     const carom_vec2 v = normal(f, i);
     const carom_vec2 y = crm_sub(x, f->p->v[i]);
-    const double su = crm_dot(u, y);
-    const double sv = crm_dot(v, y);
-    return su * fabs(su) * crm_dot(v, v) > sv * fabs(sv) * crm_dot(u, u) ? before : i;
+    const double ku = signed_square(crm_dot(u, y)) * crm_dot(v, v);
+    const double kv = signed_square(crm_dot(v, y)) * crm_dot(u, u);
+    return ku > kv ? before : i;
 }
 
-static crm_side side_of(const crm_placed *p, const crm_placed *q, int i, int j)
+static faces faces_of(const crm_placed *p, const crm_placed *q, int i, int j)
 {
-    crm_side f;
+    faces f;
     f.p = p;
     f.q = q;
     f.cos = p->cos * q->cos + p->sin * q->sin;
@@ -68,86 +79,79 @@ static crm_side side_of(const crm_placed *p, const crm_placed *q, int i, int j)
     return f;
 }
 
-void crm_sweep_start(const crm_placed *a, const crm_placed *b, const crm_axis *x, crm_side side[2])
-{
-    side[0] = side_of(a, b, x->a, x->b);
-    side[1] = side_of(b, a, x->b, x->a);
-}
-
-static double coordinates(const crm_placed *p)
-{
-    double top = p->radius;
-    for (int i = 0; i < p->n; i++) {
-        const double x = fabs(p->v[i].x);
-        const double y = fabs(p->v[i].y);
-        if (x > top) top = x;
-        if (y > top) top = y;
-    }
-    return top;
-}
-
-typedef struct best_face {
+typedef struct top {
     double height;
-    double second; /* of the other faces, A's and B's: a bound from above */
-    double least;  /* faces that cannot reach this are passed over */
+    double second; /* of the other faces, when it is within the tie */
+    double tie;
     int edge;
     int vertex;
     int on_b;
-} best_face;
+} top;
 
-static void offer(best_face *best, double h, double tie, int edge, int vertex, int on_b)
-{
-    if (h > best->height + tie) {
-        best->second = best->second > best->height ? best->second : best->height;
-        best->height = h;
-        best->edge = edge;
-        best->vertex = vertex;
-        best->on_b = on_b;
-        if (h - tie > best->least) best->least = h - tie;
-    } else if (h > best->second) {
-        best->second = h;
-    }
-}
-
-/* b / |u| < least, for a bound b times |u|, without the root. */
-static int is_below(double b, double uu, double least)
-{
-    if (least >= 0) return b < 0 || b * b < least * least * uu;
-    return b < 0 && b * b > least * least * uu;
-}
-
-static void sweep_faces(const crm_side *f, int on_b, double tie, best_face *best)
+/* Offers the faces of f, but for those that are surely lower by more than the tie than the top or
+ * than at_least, a height known to be reached. */
+static void offer_faces(const faces *f, int on_b, double at_least, top *t)
 {
     const crm_placed *p = f->p;
     if (p->n == 1) return;
     const carom_vec2 x = seen(f, f->q->v[f->vertex]);
-    for (int k = 0; k < p->n; k++) {
-        const carom_vec2 u = normal(f, k);
-        const double bound = crm_dot(u, crm_sub(x, p->v[k]));
+    double least = (at_least > t->height ? at_least : t->height) - 2 * t->tie;
+    double key = signed_square(least);
+    carom_vec2 v = p->v[p->n - 1];
+    for (int i = 0; i < p->n; i++) {
+        const carom_vec2 w = p->v[i];
+        const carom_vec2 u = crm_right(crm_sub(w, v));
+        const double bound = crm_dot(u, crm_sub(x, v));
+        v = w;
+        if (signed_square(bound) < key * crm_dot(u, u)) continue;
+        const int k = crm_prev(p, i);
         int j = f->vertex;
-        double h = f->height;
-        if (k != f->edge) {
-            if (is_below(bound, crm_dot(u, u), best->least)) continue;
-            h = height(f, k, &j);
+        const double h = k == f->edge ? f->height : height(f, k, &j);
+        if (h > t->height) {
+            t->second = t->height;
+            t->height = h;
+            t->edge = k;
+            t->vertex = j;
+            t->on_b = on_b;
+            if (h - 2 * t->tie > least) least = h - 2 * t->tie;
+            key = signed_square(least);
+        } else if (h > t->second) {
+            t->second = h;
         }
-        offer(best, h, tie, k, j, on_b);
     }
 }
 
-crm_closest crm_sweep(const crm_side side[2], double reach)
+/* Of tied faces the first: the lowest index on A, else on B. */
+static void first_of_tied(const faces *f, int on_b, double least, int *found, top *t)
 {
-    const crm_placed *a = side[0].p;
-    const crm_placed *b = side[0].q;
-    const double ca = coordinates(a);
-    const double cb = coordinates(b);
-    const double tie = TIE_TOL * (ca > cb ? ca : cb);
-    const double known = side[0].height > side[1].height ? side[0].height : side[1].height;
-    best_face best = {-HUGE_VAL, -HUGE_VAL, known - 2 * tie, 0, 0, 0};
-    sweep_faces(&side[0], 0, tie, &best);
-    sweep_faces(&side[1], 1, tie, &best);
-    crm_closest r = best.on_b ? crm_face_at(b, best.edge, a, best.vertex, 1)
-                              : crm_face_at(a, best.edge, b, best.vertex, 0);
-    r.tied = best.second >= best.height - tie;
+    const crm_placed *p = f->p;
+    for (int k = 0; p->n > 1 && !*found && k < p->n; k++) {
+        int j = f->vertex;
+        if (!(height(f, k, &j) >= least)) continue;
+        *found = 1;
+        t->edge = k;
+        t->vertex = j;
+        t->on_b = on_b;
+    }
+}
+
+crm_closest crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach)
+{
+    const faces fa = faces_of(a, b, x->a, x->b);
+    const faces fb = faces_of(b, a, x->b, x->a);
+    top t = {-HUGE_VAL, -HUGE_VAL, crm_tie(a, b), 0, 0, 0};
+    const double known = fa.height > fb.height ? fa.height : fb.height;
+    offer_faces(&fa, 0, known, &t);
+    offer_faces(&fb, 1, known, &t);
+    const int tied = t.second >= t.height - t.tie;
+    if (tied) {
+        int found = 0;
+        first_of_tied(&fa, 0, t.height - t.tie, &found, &t);
+        first_of_tied(&fb, 1, t.height - t.tie, &found, &t);
+    }
+    crm_closest r =
+        t.on_b ? crm_face_at(b, t.edge, a, t.vertex, 1) : crm_face_at(a, t.edge, b, t.vertex, 0);
+    r.tied = tied;
     if (r.gap > reach) r.kind = CRM_APART;
     return r;
 }
