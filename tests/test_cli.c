@@ -1,7 +1,7 @@
 /* The program `carom` from outside: usage, run, validate, explain. */
 #include "program.h"
 
-#include "clients/c/scene.h"
+#include "clients/c/scene/scene.h"
 
 #include <signal.h>
 #include <stdio.h>

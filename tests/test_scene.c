@@ -1,7 +1,7 @@
 /* Scene files: what is read, every kind of fault with its place, masses from shapes. */
 #include "near.h"
 
-#include "clients/c/scene.h"
+#include "clients/c/scene/scene.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* carom: the command line.  docs/cli.md is its manual. */
 #include "carom/world.h"
-#include "clients/c/scene_client.h"
+#include "clients/c/scene/remote.h"
 #include "cmd.h"
 
 #include <stdio.h>

@@ -1,5 +1,5 @@
 #include "carom/collide.h"
-#include "clients/c/scene.h"
+#include "clients/c/scene/scene.h"
 #include "cmd.h"
 #include "io/load.h"
 #include "io/output.h"

@@ -1,6 +1,6 @@
 #include "cmd.h"
-#include "gradient.h"
-#include "gradient_check.h"
+#include "gradient/check.h"
+#include "gradient/gradient.h"
 #include "io/output.h"
 #include "io/progress.h"
 

@@ -2,7 +2,7 @@
 #include "io/load.h"
 #include "io/output.h"
 #include "io/progress.h"
-#include "lcp_file.h"
+#include "lcp/file.h"
 
 #include <limits.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-#include "clients/c/scene_client.h"
+#include "clients/c/scene/remote.h"
 #include "cmd.h"
 #include "io/load.h"
 #include "io/output.h"

@@ -1,4 +1,4 @@
-#include "clients/c/scene.h"
+#include "clients/c/scene/scene.h"
 #include "cmd.h"
 #include "io/load.h"
 

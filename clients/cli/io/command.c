@@ -1,6 +1,6 @@
 #include "command.h"
 
-#include "clients/c/scene_json.h"
+#include "clients/c/scene/json.h"
 
 #include <stdarg.h>
 #include <stdio.h>

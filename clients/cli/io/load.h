@@ -2,7 +2,7 @@
 #ifndef CRM_LOAD_H
 #define CRM_LOAD_H
 
-#include "clients/c/scene.h"
+#include "clients/c/scene/scene.h"
 #include "command.h"
 
 /* Options that crm_load understands: put into a command's table. */

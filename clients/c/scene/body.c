@@ -1,6 +1,6 @@
-#include "scene_body.h"
+#include "body.h"
 
-#include "scene_mass.h"
+#include "mass.h"
 
 #include <stdlib.h>
 #include <string.h>

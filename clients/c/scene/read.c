@@ -1,6 +1,6 @@
 #include "scene.h"
 
-#include "scene_body.h"
+#include "body.h"
 
 #include <limits.h>
 #include <math.h>

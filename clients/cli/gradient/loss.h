@@ -3,7 +3,7 @@
 #define CRM_LOSS_H
 
 #include "carom/grad.h"
-#include "clients/c/scene.h"
+#include "clients/c/scene/scene.h"
 
 typedef struct crm_term {
     long step;       /* 0 ... steps of the run */

@@ -1,4 +1,4 @@
-/* scene_json.h: JSON values that know their place, and the list of everything wrong with a file. */
+/* json.h: JSON values that know their place, and the list of everything wrong with a file. */
 #ifndef CRM_SCENE_JSON_H
 #define CRM_SCENE_JSON_H
 

@@ -1,6 +1,6 @@
 /* A problem file as a carom_contact_problem: rows of two bodies, u = -q/M. */
 #include "io/progress.h"
-#include "lcp_file.h"
+#include "lcp/file.h"
 
 #include <stdlib.h>
 #include <string.h>

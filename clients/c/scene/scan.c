@@ -1,4 +1,4 @@
-#include "scene_scan.h"
+#include "scan.h"
 
 #include <ctype.h>
 #include <stdlib.h>

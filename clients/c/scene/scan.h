@@ -1,8 +1,8 @@
-/* scene_scan.h: duplicate keys in a JSON text, each with its place. */
+/* scan.h: duplicate keys in a JSON text, each with its place. */
 #ifndef CRM_SCENE_SCAN_H
 #define CRM_SCENE_SCAN_H
 
-#include "scene_json.h"
+#include "json.h"
 
 /* Notes a fault for every key that stands twice in one object of `text`, a valid JSON text ending
  * in a zero byte.  Returns how many.  Keys are compared as written: escapes are not resolved. */

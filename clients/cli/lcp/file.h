@@ -1,9 +1,9 @@
-/* lcp_file.h: a contact problem file, format of tests/data/lcp. */
+/* file.h: a contact problem file, format of tests/data/lcp. */
 #ifndef CRM_LCP_FILE_H
 #define CRM_LCP_FILE_H
 
 #include "carom/contact.h"
-#include "clients/c/scene_json.h"
+#include "clients/c/scene/json.h"
 
 /* A sparse matrix as the file has it; entries that stand twice add up. */
 typedef struct crm_triplets {

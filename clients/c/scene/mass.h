@@ -1,4 +1,4 @@
-/* scene_mass.h: mass and inertia of a body from its shapes. */
+/* mass.h: mass and inertia of a body from its shapes. */
 #ifndef CRM_SCENE_MASS_H
 #define CRM_SCENE_MASS_H
 

@@ -2,8 +2,8 @@
 #ifndef CRM_GRADIENT_H
 #define CRM_GRADIENT_H
 
+#include "gradient/loss.h"
 #include "io/load.h"
-#include "loss.h"
 
 typedef enum crm_wrt {
     CRM_Q0,

@@ -1,6 +1,6 @@
-/* scene_client.h: a scene file as the C client library takes it. */
-#ifndef CRM_SCENE_CLIENT_H
-#define CRM_SCENE_CLIENT_H
+/* remote.h: a scene file as the C client library takes it. */
+#ifndef CRM_SCENE_REMOTE_H
+#define CRM_SCENE_REMOTE_H
 
 #include "carom/client.h"
 #include "scene.h"

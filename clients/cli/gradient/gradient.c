@@ -1,4 +1,4 @@
-#include "gradient.h"
+#include "gradient/gradient.h"
 
 #include "io/progress.h"
 

@@ -1,8 +1,8 @@
-/* gradient_check.h: a gradient beside central differences of whole runs. */
+/* check.h: a gradient beside central differences of whole runs. */
 #ifndef CRM_GRADIENT_CHECK_H
 #define CRM_GRADIENT_CHECK_H
 
-#include "gradient.h"
+#include "gradient/gradient.h"
 
 enum { CRM_CHECK_STEPS = 2 }; /* step sizes tried for each entry */
 

@@ -1,4 +1,4 @@
-#include "scene_client.h"
+#include "remote.h"
 
 #include <stdio.h>
 #include <stdlib.h>

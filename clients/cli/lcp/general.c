@@ -3,7 +3,7 @@
  * contact with friction.  G = -[J_n; J_f; 0], F = -[[0,0,0], [0,0,E], [mu,-E',0]], y = -l_e. */
 #include "carom/lcp.h"
 #include "io/progress.h"
-#include "lcp_file.h"
+#include "lcp/file.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "lcp_file.h"
+#include "lcp/file.h"
 
 #include <limits.h>
 #include <stdlib.h>

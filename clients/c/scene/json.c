@@ -1,6 +1,6 @@
-#include "scene_json.h"
+#include "json.h"
 
-#include "scene_scan.h"
+#include "scan.h"
 
 #include <math.h>
 #include <stdarg.h>

@@ -1,6 +1,6 @@
-#include "gradient_check.h"
+#include "gradient/check.h"
 
-#include "clients/c/scene_mass.h"
+#include "clients/c/scene/mass.h"
 #include "io/progress.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-#include "scene_mass.h"
+#include "mass.h"
 
 #include <math.h>
 

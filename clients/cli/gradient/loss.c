@@ -1,4 +1,4 @@
-#include "loss.h"
+#include "gradient/loss.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -3,7 +3,7 @@
 #define CRM_SCENE_H
 
 #include "carom/world.h"
-#include "scene_json.h"
+#include "json.h"
 
 /* The row of a force table: from `time` on, until the next row. */
 typedef struct crm_force_row {

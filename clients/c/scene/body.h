@@ -1,4 +1,4 @@
-/* scene_body.h: the parts of a scene file that crm_scene_read hands on. */
+/* body.h: the parts of a scene file that crm_scene_read hands on. */
 #ifndef CRM_SCENE_BODY_H
 #define CRM_SCENE_BODY_H
 

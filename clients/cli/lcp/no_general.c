@@ -1,5 +1,5 @@
 /* crm_lcp_general in a build without libsolver/lcp. */
-#include "lcp_file.h"
+#include "lcp/file.h"
 
 #include <stdio.h>
 
