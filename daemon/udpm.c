@@ -1,10 +1,8 @@
 #include "udpm.h"
 
 #include <arpa/inet.h>
-#include <errno.h>
-#include <ifaddrs.h>
-#include <net/if.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +10,7 @@
 #include <unistd.h>
 
 static const char *const DEFAULT_ADDRESS = "239.255.76.67";
-enum { DEFAULT_PORT = 7667, WANTED_BUFFER = 4 << 20 };
+enum { DEFAULT_PORT = 7667, WANTED_BUFFER = 4 << 20, COMES_BACK_MS = 500 };
 
 static int parse(const char *url, struct sockaddr_in *to, long *buffer, char *text)
 {
@@ -34,46 +32,66 @@ static int parse(const char *url, struct sockaddr_in *to, long *buffer, char *te
     return 0;
 }
 
-/* Flags and name of the interface with this address; 0: there is none. */
-static unsigned interface_flags(struct in_addr address, char *name, size_t size)
+static int has_route(const struct sockaddr_in *to)
 {
-    struct ifaddrs *list = NULL;
-    unsigned flags = 0;
-    if (getifaddrs(&list) < 0) return 0;
-    for (const struct ifaddrs *i = list; i && !flags; i = i->ifa_next) {
-        if (!i->ifa_addr || i->ifa_addr->sa_family != AF_INET) continue;
-        const struct sockaddr_in *a = (const struct sockaddr_in *)(const void *)i->ifa_addr;
-        if (a->sin_addr.s_addr != address.s_addr) continue;
-        flags = i->ifa_flags;
-        snprintf(name, size, "%s", i->ifa_name);
+    const int s = socket(AF_INET, SOCK_DGRAM, 0);
+    const int routed = s >= 0 && connect(s, (const struct sockaddr *)to, sizeof *to) == 0;
+    if (s >= 0) close(s);
+    return routed;
+}
+
+/* Opens a socket on a free port that has joined the group; *at is where it listens. */
+static int join(const struct sockaddr_in *group, struct sockaddr_in *at)
+{
+    struct ip_mreq request;
+    socklen_t length = sizeof *at;
+    const int s = socket(AF_INET, SOCK_DGRAM, 0);
+    if (s < 0) return -1;
+    *at = *group;
+    at->sin_port = 0;
+    request.imr_multiaddr = group->sin_addr;
+    request.imr_interface.s_addr = htonl(INADDR_ANY);
+    if (bind(s, (struct sockaddr *)at, sizeof *at) == 0 &&
+        setsockopt(s, IPPROTO_IP, IP_ADD_MEMBERSHIP, &request, sizeof request) == 0 &&
+        getsockname(s, (struct sockaddr *)at, &length) == 0) {
+        return s;
     }
-    freeifaddrs(list);
-    return flags;
+    close(s);
+    return -1;
+}
+
+/* 1: a datagram sent to the group, on another port, comes back. */
+static int comes_back(const struct sockaddr_in *group)
+{
+    struct sockaddr_in at;
+    const unsigned char ttl = 0;
+    const char question[] = "carom";
+    char answer[sizeof question] = "";
+    const int s = join(group, &at);
+    struct pollfd p = {s, POLLIN, 0};
+    if (s < 0) return 0;
+    setsockopt(s, IPPROTO_IP, IP_MULTICAST_TTL, &ttl, sizeof ttl);
+    const ssize_t sent =
+        sendto(s, question, sizeof question, 0, (const struct sockaddr *)&at, sizeof at);
+    const int came = sent == (ssize_t)sizeof question && poll(&p, 1, COMES_BACK_MS) > 0 &&
+                     recv(s, answer, sizeof answer, 0) == sent &&
+                     memcmp(answer, question, sizeof question) == 0;
+    close(s);
+    return came;
 }
 
 static int check_route(const struct sockaddr_in *to, char *text)
 {
-    struct sockaddr_in from;
-    socklen_t length = sizeof from;
-    char name[IF_NAMESIZE + 1] = "";
-    const int s = socket(AF_INET, SOCK_DGRAM, 0);
-    const int routed = s >= 0 && connect(s, (const struct sockaddr *)to, sizeof *to) == 0 &&
-                       getsockname(s, (struct sockaddr *)&from, &length) == 0;
-    if (s >= 0) close(s);
-    if (!routed) {
-        snprintf(text, CRM_UDPM_TEXT,
-                 "no route to multicast addresses.  For this machine alone:\n"
-                 "  sudo ip link set lo multicast on\n"
-                 "  sudo ip route add 224.0.0.0/4 dev lo");
-        return 0;
-    }
-    const unsigned flags = interface_flags(from.sin_addr, name, sizeof name);
-    if (flags & IFF_MULTICAST) return 1;
-    if (!flags) return 1; /* an address of no interface: let LCM try */
+    const int routed = has_route(to);
+    if (routed && comes_back(to)) return 1;
     snprintf(text, CRM_UDPM_TEXT,
-             "the route to multicast addresses leads to %s, which has multicast off:\n"
-             "  sudo ip link set %s multicast on",
-             name, name);
+             "%s.  For this machine alone:\n"
+             "  sudo ip link set lo multicast on\n"
+             "  sudo ip route %s 224.0.0.0/4 dev lo",
+             routed ? "multicast datagrams do not come back: a firewall, or an interface without "
+                      "multicast"
+                    : "no route to multicast addresses",
+             routed ? "replace" : "add");
     return 0;
 }
 
