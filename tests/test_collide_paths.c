@@ -68,6 +68,13 @@ static void random_pair(rng *r, int lattice, core *a, core *b, crm_placed *pa, c
     *pb = placed(&b->shape, rng_uniform(r, -4, 4), at);
 }
 
+static crm_closest features(const crm_placed *a, const crm_placed *b, int gjk_min_vertices)
+{
+    crm_closest c;
+    crm_closest_features(a, b, HUGE_VAL, gjk_min_vertices, &c);
+    return c;
+}
+
 static int same(const crm_closest *x, const crm_closest *y)
 {
     return x->kind == y->kind && x->a == y->a && x->b == y->b && x->tied == y->tied &&
@@ -105,8 +112,8 @@ static void check_ways(int lattice, uint64_t seed)
         crm_placed a;
         crm_placed b;
         random_pair(&r, lattice, &ca, &cb, &a, &b);
-        const crm_closest plain = crm_closest_features(&a, &b, HUGE_VAL, INT_MAX);
-        const crm_closest through = crm_closest_features(&a, &b, HUGE_VAL, 0);
+        const crm_closest plain = features(&a, &b, INT_MAX);
+        const crm_closest through = features(&a, &b, 0);
         expect_same("with GJK", k, &through, &plain);
         if (!(plain.gap > 1e-9)) continue;
         n_apart++;
@@ -156,7 +163,7 @@ static void gjk_is_certified(void **state)
         crm_axis x;
         random_pair(&r, 0, &ca, &cb, &a, &b);
         if (!crm_gjk(&a, &b, crm_vec(0, 1), &x) || !is_certified(&a, &b, x)) continue;
-        assert_true(crm_closest_features(&a, &b, HUGE_VAL, INT_MAX).gap > 0);
+        assert_true(features(&a, &b, INT_MAX).gap > 0);
     }
 }
 
@@ -178,8 +185,8 @@ static void thousands_of_vertices(void **state)
         const double d = 2 + 0.04 * (k - 10);
         const crm_placed a = placed(&shape, 0.1 * k, (carom_vec2){0, 0});
         const crm_placed b = placed(&shape, 0.2 * k, crm_vec(d * cos(t), d * sin(t)));
-        const crm_closest with = crm_closest_features(&a, &b, HUGE_VAL, 0);
-        const crm_closest without = crm_closest_features(&a, &b, HUGE_VAL, INT_MAX);
+        const crm_closest with = features(&a, &b, 0);
+        const crm_closest without = features(&a, &b, INT_MAX);
         expect_same("5000 vertices", k, &with, &without);
         assert_true(with.gap >= d - 2 - 1e-13 && with.gap <= d - 2 + 2 * sagitta + 1e-13);
     }

@@ -125,30 +125,32 @@ static int is_off(const link_view *k, const crm_placed *b, const carom_manifold 
 }
 
 /* Along the link's own normal: what of b is over it. */
-static carom_manifold over_face(const link_view *k, const crm_placed *b)
+static void over_face(const link_view *k, const crm_placed *b, carom_manifold *out)
 {
-    const crm_closest c = crm_face_at(&k->p, 0, b, crm_support(b, crm_neg(k->normal)), 0);
-    carom_manifold m = crm_manifold_of(&k->p, b, &c);
-    if (is_off(k, b, &m)) m.count = 0;
-    return m;
+    crm_closest c;
+    crm_face_at(&k->p, 0, b, crm_support(b, crm_neg(k->normal)), 0, &c);
+    crm_manifold_of(&k->p, b, &c, HUGE_VAL, out);
+    if (is_off(k, b, out)) out->count = 0;
 }
 
-static carom_manifold answer(const link_view *k, const crm_placed *b, const crm_closest *c)
+static void answer(const link_view *k, const crm_placed *b, const crm_closest *c,
+                   carom_manifold *out)
 {
     const int behind = is_behind(k, b, k->normal);
     if (behind) {
         /* At a sharp convex start it may still be in front of the link before. */
         const int beside = c->kind != CRM_FACE_A && c->a == 0 && k->joined[0] && k->convex[0];
-        if (!beside || is_behind(k, b, k->border[0])) return crm_no_contact(HUGE_VAL);
+        if (!beside || is_behind(k, b, k->border[0])) return;
     }
-    if (c->kind == CRM_FACE_A) {
-        return c->a == 0 ? crm_manifold_of(&k->p, b, c) : over_face(k, b);
+    const int straight = c->kind != CRM_FACE_A && !k->convex[c->a];
+    if (straight || (c->kind == CRM_FACE_A && c->a == 1)) {
+        over_face(k, b, out);
+        return;
     }
-    carom_manifold m = crm_manifold_of(&k->p, b, c);
-    if (!k->convex[c->a]) return over_face(k, b);
-    if (!may_give(k, c->a, m.normal)) return crm_no_contact(HUGE_VAL);
-    drop_joint(k, &m);
-    return m;
+    crm_manifold_of(&k->p, b, c, HUGE_VAL, out);
+    if (c->kind == CRM_FACE_A) return;
+    if (!may_give(k, c->a, out->normal)) out->count = 0;
+    drop_joint(k, out);
 }
 
 /* Recipes of the link become recipes of the chain. */
@@ -159,6 +161,23 @@ static carom_recipe of_chain(const link_view *k, carom_recipe r)
     /* Edge 1 is edge 0 from behind: the same line, cut at the same point. */
     *on_link = is_vertex ? k->index[*on_link] : k->index[0];
     return r;
+}
+
+/* Recipes and points of the whole chain, within the margin. */
+static void move_to_chain(const carom_chain *chain, const link_view *k, const carom_frame *frame,
+                          const crm_placed *b, double margin, carom_manifold *m)
+{
+    const carom_shape whole = carom_chain_shape(chain);
+    const crm_placed a = crm_place(&whole, frame, crm_vec(0, 0));
+    const int n = m->count;
+    m->count = 0;
+    m->distance = HUGE_VAL;
+    for (int i = 0; i < n; i++) {
+        const carom_recipe r = of_chain(k, m->points[i].recipe);
+        const carom_contact_point p = crm_contact_at(&a, b, r, &m->normal);
+        if (p.gap < m->distance) m->distance = p.gap;
+        if (p.gap <= margin) m->points[m->count++] = p;
+    }
 }
 
 carom_box carom_chain_box(const carom_chain *chain, int link, carom_pose pose)
@@ -177,17 +196,11 @@ carom_manifold carom_collide_chain(const carom_chain *chain, int link, carom_pos
     view_link(chain, link, &fa, &k);
     const crm_placed pb = crm_place(b, &fb, crm_vec(fb.x - fa.x, fb.y - fa.y));
     const double radii = chain->radius + b->radius;
-    const crm_closest c = crm_features(&k.p, &pb, margin + radii);
+    crm_closest c;
+    crm_features(&k.p, &pb, margin + radii, &c);
     if (c.kind == CRM_APART) return crm_no_contact(c.gap - radii);
-    carom_manifold m = answer(&k, &pb, &c);
-    const carom_shape whole = carom_chain_shape(chain);
-    const crm_placed pa = crm_place(&whole, &fa, crm_vec(0, 0));
-    m.distance = HUGE_VAL;
-    for (int i = 0; i < m.count; i++) {
-        const carom_recipe r = of_chain(&k, m.points[i].recipe);
-        m.points[i] = crm_contact_at(&pa, &pb, r, &m.normal);
-        if (m.points[i].gap < m.distance) m.distance = m.points[i].gap;
-    }
-    crm_keep_within(&m, margin);
+    carom_manifold m = crm_no_contact(HUGE_VAL);
+    answer(&k, &pb, &c, &m);
+    move_to_chain(chain, &k, &fa, &pb, margin, &m);
     return m;
 }

@@ -31,16 +31,15 @@ double crm_tie(const crm_placed *a, const crm_placed *b)
     return TIE_TOL * (x > y ? x : y);
 }
 
-crm_closest crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b)
+void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b,
+                 crm_closest *out)
 {
-    crm_closest r;
-    r.kind = on_b ? CRM_FACE_B : CRM_FACE_A;
-    r.a = on_b ? j : edge;
-    r.b = on_b ? edge : j;
-    r.tied = 0;
-    r.ref = crm_reference_at(p, edge);
-    r.gap = crm_dot(r.ref.m, crm_between(p, edge, q, j));
-    return r;
+    out->kind = on_b ? CRM_FACE_B : CRM_FACE_A;
+    out->a = on_b ? j : edge;
+    out->b = on_b ? edge : j;
+    out->tied = 0;
+    out->ref = crm_reference_at(p, edge);
+    out->gap = crm_dot(out->ref.m, crm_between(p, edge, q, j));
 }
 
 static crm_axis axis_along(const crm_placed *a, const crm_placed *b, carom_vec2 d)
@@ -65,7 +64,10 @@ int crm_closest_from(const crm_placed *a, const crm_placed *b, crm_axis x, doubl
         out->gap = h / length;
         return 1;
     }
-    return crm_walk(a, b, x, out) && out->gap > crm_noise(a, out->a, b, out->b);
+    crm_closest r;
+    if (!crm_walk(a, b, x, &r) || !(r.gap > crm_noise(a, r.a, b, r.b))) return 0;
+    *out = r;
+    return 1;
 }
 
 /* The foot of the vertex is on the face's edge, or the other shape's edge at that vertex lies along
@@ -88,52 +90,52 @@ static int foot_on_face(const crm_placed *p, int k, const crm_placed *q, int j, 
 }
 
 /* Needles in line: the face's own direction separates. */
-static int walk_lengthwise(const crm_placed *a, const crm_placed *b, const crm_closest *face,
-                           double reach, crm_closest *out)
+static void walk_lengthwise(const crm_placed *a, const crm_placed *b, double reach,
+                            crm_closest *face)
 {
     const int on_a = face->kind == CRM_FACE_A;
     const crm_placed *p = on_a ? a : b;
     const crm_placed *q = on_a ? b : a;
     const int k = on_a ? face->a : face->b;
     const int j = on_a ? face->b : face->a;
-    if (foot_on_face(p, k, q, j, crm_noise(p, k, q, j))) return 0;
+    if (foot_on_face(p, k, q, j, crm_noise(p, k, q, j))) return;
     const carom_vec2 e = face->ref.e;
-    return crm_closest_from(a, b, axis_along(a, b, e), reach, out) ||
-           crm_closest_from(a, b, axis_along(a, b, crm_neg(e)), reach, out);
+    if (crm_closest_from(a, b, axis_along(a, b, e), reach, face)) return;
+    crm_closest_from(a, b, axis_along(a, b, crm_neg(e)), reach, face);
 }
 
-/* From the face of largest separation. */
-static crm_closest from_face(const crm_placed *a, const crm_placed *b, const crm_closest *face,
-                             double reach)
+/* From the face of largest separation to the closest features, if it separates. */
+static void leave_face(const crm_placed *a, const crm_placed *b, double reach, crm_closest *face)
 {
-    crm_closest r;
     const double tol = crm_noise(a, face->a, b, face->b);
     if (face->gap > tol) {
         const carom_vec2 m = face->ref.m;
         const crm_axis x = {face->kind == CRM_FACE_A ? m : crm_neg(m), face->a, face->b};
-        if (crm_closest_from(a, b, x, reach, &r)) return r;
-    } else if (face->gap >= -tol && walk_lengthwise(a, b, face, reach, &r)) {
-        return r;
+        crm_closest_from(a, b, x, reach, face);
+    } else if (face->gap >= -tol) {
+        walk_lengthwise(a, b, reach, face);
     }
-    return *face;
 }
 
-crm_closest crm_closest_features(const crm_placed *a, const crm_placed *b, double reach,
-                                 int gjk_min_vertices)
+void crm_closest_features(const crm_placed *a, const crm_placed *b, double reach,
+                          int gjk_min_vertices, crm_closest *out)
 {
     const int few = a->n <= CRM_FEW && b->n <= CRM_FEW;
     const int n = a->n + b->n;
-    crm_closest r;
     crm_axis x;
     if (!few || n >= gjk_min_vertices) {
         const carom_vec2 between = crm_sub(crm_turn(b, crm_middle(b)), crm_turn(a, crm_middle(a)));
         x = axis_along(a, b, crm_add(crm_sub(b->at, a->at), between));
-        if (crm_closest_from(a, b, x, reach, &r)) return r;
+        if (crm_closest_from(a, b, x, reach, out)) return;
     }
     if (n >= gjk_min_vertices) {
         crm_axis y;
-        if (crm_gjk(a, b, x.d, &y) && crm_closest_from(a, b, y, reach, &r)) return r;
+        if (crm_gjk(a, b, x.d, &y) && crm_closest_from(a, b, y, reach, out)) return;
     }
-    r = few ? crm_sweep_few(a, b, reach) : crm_sweep(a, b, &x, reach);
-    return r.kind == CRM_APART ? r : from_face(a, b, &r, reach);
+    if (few) {
+        crm_sweep_few(a, b, reach, out);
+    } else {
+        crm_sweep(a, b, &x, reach, out);
+    }
+    if (out->kind != CRM_APART) leave_face(a, b, reach, out);
 }

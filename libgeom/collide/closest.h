@@ -25,7 +25,8 @@ typedef struct crm_closest {
 double crm_noise(const crm_placed *a, int i, const crm_placed *b, int j);
 
 /* Edge `edge` of p, vertex j of q; on_b: p is B. */
-crm_closest crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b);
+void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b,
+                 crm_closest *out);
 
 /* The parts, in closest.c, walk.c, sweep.c and gjk.c. --------------------------------------- */
 
@@ -45,11 +46,12 @@ int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closes
  * within 1e-14 of the coordinates of that, the first is taken, A's before B's.  x: any axis with
  * its support vertices, to begin with.  CRM_APART: a face separates by more than reach.  Not both
  * may be points. */
-crm_closest crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach);
+void crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach,
+               crm_closest *out);
 
 /* The same where neither core has more than CRM_FEW vertices. */
 enum { CRM_FEW = 8 };
-crm_closest crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach);
+void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_closest *out);
 
 /* Faces whose heights differ by less are tied [m]. */
 double crm_tie(const crm_placed *a, const crm_placed *b);
@@ -64,10 +66,11 @@ int crm_gjk(const crm_placed *a, const crm_placed *b, carom_vec2 first, crm_axis
 enum { CRM_GJK_MIN_VERTICES = 256 };
 
 /* reach [m]: give up (CRM_APART) when farther; HUGE_VAL: never.  Not both may be points. */
-crm_closest crm_closest_features(const crm_placed *a, const crm_placed *b, double reach,
-                                 int gjk_min_vertices);
+void crm_closest_features(const crm_placed *a, const crm_placed *b, double reach,
+                          int gjk_min_vertices, crm_closest *out);
 
-/* The same from an axis that may or may not be certified, when it leads there; 0: it does not. */
+/* The same from an axis that may or may not be certified, when it leads there; 0: it does not, and
+ * *out is not touched. */
 int crm_closest_from(const crm_placed *a, const crm_placed *b, crm_axis x, double reach,
                      crm_closest *out);
 

@@ -35,20 +35,19 @@ static void keep_features(const crm_closest *c, carom_pair_cache *cache)
     cache->b = c->b;
 }
 
-static crm_closest find_features(const crm_placed *a, const crm_placed *b, double reach,
-                                 carom_pair_cache *cache)
+static void find_features(const crm_placed *a, const crm_placed *b, double reach,
+                          carom_pair_cache *cache, crm_closest *out)
 {
-    crm_closest c;
-    if (!cache || (a->n == 1 && b->n == 1)) return crm_features(a, b, reach);
+    if (!cache || (a->n == 1 && b->n == 1)) {
+        crm_features(a, b, reach, out);
+        return;
+    }
     /* Indices that another pair left must not lead outside. */
     const int usable = cache->kind != NOT_KNOWN && cache->a < a->n && cache->b < b->n;
-    if (usable && crm_closest_from(a, b, axis_from(a, b, cache), reach, &c)) {
-        if (c.kind != CRM_APART) keep_features(&c, cache);
-        return c;
+    if (!usable || !crm_closest_from(a, b, axis_from(a, b, cache), reach, out)) {
+        crm_features(a, b, reach, out);
     }
-    c = crm_features(a, b, reach);
-    keep_features(&c, cache);
-    return c;
+    if (out->kind != CRM_APART) keep_features(out, cache);
 }
 
 carom_manifold carom_collide_frames(const carom_shape *a, const carom_frame *frame_a,
@@ -59,10 +58,11 @@ carom_manifold carom_collide_frames(const carom_shape *a, const carom_frame *fra
     const crm_placed pb =
         crm_place(b, frame_b, crm_vec(frame_b->x - frame_a->x, frame_b->y - frame_a->y));
     const double radii = a->radius + b->radius;
-    const crm_closest c = find_features(&pa, &pb, margin + radii, cache);
+    crm_closest c;
+    carom_manifold m;
+    find_features(&pa, &pb, margin + radii, cache, &c);
     if (c.kind == CRM_APART) return crm_no_contact(c.gap - radii);
-    carom_manifold m = crm_manifold_of(&pa, &pb, &c);
-    crm_keep_within(&m, margin);
+    crm_manifold_of(&pa, &pb, &c, margin, &m);
     return m;
 }
 

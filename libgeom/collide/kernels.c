@@ -1,14 +1,4 @@
-/* kernels.c: the three contact kernels and their reverse derivatives.
- *
- * In terms of the arms (vertices relative to their own body) and D = position of the second shape -
- * position of the first.  docs/math/equations.md (40)-(43), with a radius on either side:
- *
- *   point-point   u = D + b - a, l = |u|, n = u / l;  gap = l - ra - rb
- *                 arm_a = a + ra n,  arm_b = b - rb n
- *   edge-point    e the edge from arm a, m its unit normal, x = D + q - a, h = m . x;
- *                 gap = h - rp - rq;  arm_p = q + D - (h - rp) m,  arm_q = q - rq m
- *   clipped       N = e . (c - i - D), w the incident edge from arm i, tau = N / (e . w);
- *                 then edge-point with q = i + tau w */
+/* kernels.c: contact points from their recipes, and the reverse derivatives. */
 #include "collide/kernels.h"
 
 #include <assert.h>
@@ -25,43 +15,29 @@ static point_point point_point_at(carom_vec2 u)
     return k;
 }
 
-/* Reference shape p, incident shape q. */
+/* Reference shape p, incident shape q, and their point. */
 typedef struct edge_point {
     const crm_placed *p;
     const crm_placed *q;
-    carom_vec2 d;      /* position of q - position of p */
-    crm_reference ref; /* e, t, m */
-    carom_vec2 arm;    /* the incident point, relative to q's body */
-    carom_vec2 x;      /* from the start of the edge to the incident point */
-    double h;
-    /* clipped only */
-    carom_vec2 w;   /* incident edge */
-    carom_vec2 cut; /* c - i - D */
-    double tau;
-    double slope; /* e . w */
+    carom_vec2 d; /* position of q - position of p */
+    crm_reference ref;
+    crm_edge_point at;
 } edge_point;
 
-static carom_vec2 clip(edge_point *k, carom_recipe r)
+static void see_edge_point(const crm_placed *p, const crm_placed *q, carom_recipe r, edge_point *k)
 {
-    const int end = r.at_end ? crm_next(k->p, r.ref) : r.ref;
-    const carom_vec2 i = crm_arm(k->q, r.inc);
-    k->w = crm_edge(k->q, r.inc);
-    k->cut = crm_sub(crm_sub(crm_arm(k->p, end), i), k->d);
-    k->slope = crm_dot(k->ref.e, k->w);
-    k->tau = k->slope != 0 ? crm_dot(k->ref.e, k->cut) / k->slope : 0.0;
-    return crm_add_scaled(i, k->tau, k->w);
-}
-
-static void see_edge_point(const crm_reference *ref, const crm_placed *p, const crm_placed *q,
-                           carom_recipe r, edge_point *k)
-{
+    const carom_vec2 start = crm_arm(p, r.ref);
+    const carom_vec2 i = crm_arm(q, r.inc);
     k->p = p;
     k->q = q;
     k->d = crm_sub(q->at, p->at);
-    k->ref = *ref;
-    k->arm = r.kernel == CAROM_EDGE_CLIPPED ? clip(k, r) : crm_arm(q, r.inc);
-    k->x = crm_add(k->d, crm_sub(k->arm, crm_arm(p, r.ref)));
-    k->h = crm_dot(ref->m, k->x);
+    k->ref = crm_reference_at(p, r.ref);
+    if (r.kernel == CAROM_EDGE_CLIPPED) {
+        const carom_vec2 c = r.at_end ? crm_arm(p, crm_next(p, r.ref)) : start;
+        crm_set_cut(&k->ref, k->d, start, i, crm_edge(q, r.inc), c, &k->at);
+    } else {
+        crm_set_point(&k->ref, k->d, start, i, &k->at);
+    }
 }
 
 static carom_contact_point eval_point_point(const crm_placed *a, const crm_placed *b,
@@ -77,30 +53,19 @@ static carom_contact_point eval_point_point(const crm_placed *a, const crm_place
     return out;
 }
 
-carom_contact_point crm_contact_on(const crm_reference *ref, const crm_placed *a,
-                                   const crm_placed *b, carom_recipe r, carom_vec2 *normal)
-{
-    edge_point k;
-    see_edge_point(ref, r.flipped ? b : a, r.flipped ? a : b, r, &k);
-    const carom_vec2 arm_p = crm_add_scaled(crm_add(k.arm, k.d), k.p->radius - k.h, ref->m);
-    const carom_vec2 arm_q = crm_add_scaled(k.arm, -k.q->radius, ref->m);
-    carom_contact_point out;
-    *normal = r.flipped ? crm_neg(ref->m) : ref->m;
-    out.arm_a = r.flipped ? arm_q : arm_p;
-    out.arm_b = r.flipped ? arm_p : arm_q;
-    out.gap = k.h - (a->radius + b->radius);
-    out.recipe = r;
-    return out;
-}
-
 carom_contact_point crm_contact_at(const crm_placed *a, const crm_placed *b, carom_recipe r,
                                    carom_vec2 *normal)
 {
     assert(r.ref >= 0 && r.ref < (r.flipped ? b->n : a->n));
     assert(r.inc >= 0 && r.inc < (r.flipped ? a->n : b->n));
     if (r.kernel == CAROM_POINT_POINT) return eval_point_point(a, b, r, normal);
-    const crm_reference ref = crm_reference_at(r.flipped ? b : a, r.ref);
-    return crm_contact_on(&ref, a, b, r, normal);
+    edge_point k;
+    carom_contact_point out;
+    see_edge_point(r.flipped ? b : a, r.flipped ? a : b, r, &k);
+    crm_put_point(&k.ref, k.d, &k.at, k.p->radius, k.q->radius, r.flipped, &out);
+    out.recipe = r;
+    *normal = r.flipped ? crm_neg(k.ref.m) : k.ref.m;
+    return out;
 }
 
 /* x = R v for a vertex or an edge: adds x_bar to the cotangents of the angle and of v. */
@@ -158,15 +123,16 @@ static void point_point_vjp(const crm_placed *a, const crm_placed *b, carom_reci
 static carom_vec2 clip_vjp(const edge_point *k, carom_recipe r, carom_vec2 q_bar,
                            carom_shape_bar *p_bar, carom_shape_bar *s_bar)
 {
-    const double tau_bar = k->slope != 0 ? crm_dot(q_bar, k->w) / k->slope : 0.0; /* = N_bar */
-    const double slope_bar = -k->tau * tau_bar;
+    const double tau_bar =
+        k->at.slope != 0 ? crm_dot(q_bar, k->at.w) / k->at.slope : 0.0; /* = N_bar */
+    const double slope_bar = -k->at.tau * tau_bar;
     const carom_vec2 cut_bar = crm_scale(tau_bar, k->ref.e);
-    const carom_vec2 w_bar = crm_add_scaled(crm_scale(k->tau, q_bar), slope_bar, k->ref.e);
+    const carom_vec2 w_bar = crm_add_scaled(crm_scale(k->at.tau, q_bar), slope_bar, k->ref.e);
     arm_vjp(k->q, r.inc, crm_sub(q_bar, cut_bar), s_bar);
     edge_vjp(k->q, r.inc, w_bar, s_bar);
     arm_vjp(k->p, r.at_end ? crm_next(k->p, r.ref) : r.ref, cut_bar, p_bar);
     offset_vjp(crm_neg(cut_bar), p_bar, s_bar);
-    return crm_add_scaled(crm_scale(tau_bar, k->cut), slope_bar, k->w);
+    return crm_add_scaled(crm_scale(tau_bar, k->at.cut), slope_bar, k->at.w);
 }
 
 /* (42) with both radii; g is seen from the reference shape: arm_a is on p, arm_b on q.
@@ -177,9 +143,9 @@ static void edge_point_vjp(const edge_point *k, carom_recipe r, const carom_cont
                            carom_shape_bar *p_bar, carom_shape_bar *q_bar)
 {
     const double h_bar = g->gap - crm_dot(k->ref.m, g->arm_a);
-    carom_vec2 m_bar = crm_add_scaled(g->normal, k->p->radius - k->h, g->arm_a);
+    carom_vec2 m_bar = crm_add_scaled(g->normal, k->p->radius - k->at.h, g->arm_a);
     m_bar = crm_add_scaled(m_bar, -k->q->radius, g->arm_b);
-    m_bar = crm_add_scaled(m_bar, h_bar, k->x);
+    m_bar = crm_add_scaled(m_bar, h_bar, k->at.x);
     carom_vec2 e_bar = crm_scale(-crm_dot(k->ref.t, m_bar) / k->ref.length, k->ref.m);
     const carom_vec2 d_bar = crm_add_scaled(g->arm_a, h_bar, k->ref.m);
     const carom_vec2 point_bar = crm_add(d_bar, g->arm_b);
@@ -227,9 +193,8 @@ void carom_contact_vjp(const carom_shape *a, carom_pose pose_a, const carom_shap
     }
     const crm_placed *p = recipe.flipped ? &pb : &pa;
     const crm_placed *q = recipe.flipped ? &pa : &pb;
-    const crm_reference ref = crm_reference_at(p, recipe.ref);
     edge_point k;
-    see_edge_point(&ref, p, q, recipe, &k);
+    see_edge_point(p, q, recipe, &k);
     if (recipe.flipped) {
         const carom_contact_bar g = {crm_neg(bar->normal), bar->arm_b, bar->arm_a, bar->gap};
         edge_point_vjp(&k, recipe, &g, b_bar, a_bar);

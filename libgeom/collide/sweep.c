@@ -135,7 +135,8 @@ static void first_of_tied(const faces *f, int on_b, double least, int *found, to
     }
 }
 
-crm_closest crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach)
+void crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach,
+               crm_closest *out)
 {
     const faces fa = faces_of(a, b, x->a, x->b);
     const faces fb = faces_of(b, a, x->b, x->a);
@@ -149,9 +150,7 @@ crm_closest crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *
         first_of_tied(&fa, 0, t.height - t.tie, &found, &t);
         first_of_tied(&fb, 1, t.height - t.tie, &found, &t);
     }
-    crm_closest r =
-        t.on_b ? crm_face_at(b, t.edge, a, t.vertex, 1) : crm_face_at(a, t.edge, b, t.vertex, 0);
-    r.tied = tied;
-    if (r.gap > reach) r.kind = CRM_APART;
-    return r;
+    crm_face_at(t.on_b ? b : a, t.edge, t.on_b ? a : b, t.vertex, t.on_b, out);
+    out->tied = tied;
+    if (out->gap > reach) out->kind = CRM_APART;
 }

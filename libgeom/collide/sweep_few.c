@@ -74,16 +74,28 @@ static int lowest_over(const few *p, int k, const few *q)
     return j;
 }
 
-static crm_closest apart_by(double gap)
+static void apart_by(double gap, crm_closest *out)
 {
-    crm_closest r;
-    r.kind = CRM_APART;
-    r.a = r.b = r.tied = 0;
-    r.gap = gap;
-    return r;
+    out->kind = CRM_APART;
+    out->a = out->b = out->tied = 0;
+    out->gap = gap;
 }
 
-crm_closest crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach)
+/* The first of n keys that is not below `least`; *tied: there is another. */
+static int first_of(int n, const double *key, double least, int *tied)
+{
+    int first = 0;
+    int count = 0;
+    for (int k = n - 1; k >= 0; k--) {
+        const int in = key[k] >= least;
+        first = in ? k : first;
+        count += in;
+    }
+    *tied = count > 1;
+    return first;
+}
+
+void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_closest *out)
 {
     few fa;
     few fb;
@@ -91,27 +103,28 @@ crm_closest crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach
     gather(a, &fa);
     gather_seen(a, b, &fb);
     const double top_a = keys_of(&fa, &fb, key);
-    if (top_a > reach * reach) return apart_by(sqrt(top_a));
+    if (top_a > reach * reach) {
+        apart_by(sqrt(top_a), out);
+        return;
+    }
     const int n_a = a->n > 1 ? a->n : 0;
     const int n = n_a + (b->n > 1 ? b->n : 0);
     const double top_b = keys_of(&fb, &fa, key + n_a);
     const double top = top_a > top_b ? top_a : top_b;
     const double height = height_of(top);
-    if (height > reach) return apart_by(height);
-    const double least = height - crm_tie(a, b);
-    double least_key = least * fabs(least);
-    if (top < least_key) least_key = top; /* the root's rounding */
-    int first = n;
-    int n_tied = 0;
-    for (int k = n - 1; k >= 0; k--) {
-        const int tied = key[k] >= least_key;
-        first = tied ? k : first;
-        n_tied += tied;
+    if (height > reach) {
+        apart_by(height, out);
+        return;
     }
-    if (first == n) first = 0; /* NaN */
-    const int on_b = first >= n_a;
-    crm_closest r = on_b ? crm_face_at(b, first - n_a, a, lowest_over(&fb, first - n_a, &fa), 1)
-                         : crm_face_at(a, first, b, lowest_over(&fa, first, &fb), 0);
-    r.tied = n_tied > 1;
-    return r;
+    const double least = height - crm_tie(a, b);
+    const double least_key = least * fabs(least);
+    int tied;
+    /* The root's rounding may lift the key over the top. */
+    const int k = first_of(n, key, least_key < top ? least_key : top, &tied);
+    if (k >= n_a) {
+        crm_face_at(b, k - n_a, a, lowest_over(&fb, k - n_a, &fa), 1, out);
+    } else {
+        crm_face_at(a, k, b, lowest_over(&fa, k, &fb), 0, out);
+    }
+    out->tied = tied;
 }

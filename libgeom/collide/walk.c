@@ -101,31 +101,35 @@ static corner start_at(const crm_placed *a, const crm_placed *b, int i, int j)
     return c;
 }
 
-static crm_closest at_vertices(const corner *c)
+static void at_vertices(const corner *c, crm_closest *out)
 {
-    crm_closest r = {CRM_VERTICES, c->a, c->b, 0, crm_length(c->w), {{0, 0}, 0, {0, 0}, {0, 0}}};
-    return r;
+    out->kind = CRM_VERTICES;
+    out->a = c->a;
+    out->b = c->b;
+    out->tied = 0;
+    out->gap = crm_length(c->w);
 }
 
-/* c and d: the corners on the two sides of the border. */
-static crm_closest at_border(const crm_placed *a, const crm_placed *b, const corner *c,
-                             const corner *d, int edges, int side)
+/* before: the corner clockwise of the border. */
+static void at_border(const crm_placed *a, const crm_placed *b, const corner *before, int edges,
+                      crm_closest *out)
 {
-    const corner *before = side == CCW ? c : d;
-    if (!(edges & 1)) return crm_face_at(b, before->b, a, before->a, 1);
-    crm_closest r = crm_face_at(a, before->a, b, before->b, 0);
+    if (!(edges & 1)) {
+        crm_face_at(b, before->b, a, before->a, 1, out);
+        return;
+    }
+    crm_face_at(a, before->a, b, before->b, 0, out);
     if (edges & 2) {
         /* The lower end of B's edge, which runs from before->b to the next; of equal ones its
          * start. */
         const int next = crm_next(b, before->b);
-        const double gap = crm_dot(r.ref.m, crm_between(a, r.a, b, next));
-        r.tied = 1;
-        if (gap < r.gap) {
-            r.b = next;
-            r.gap = gap;
+        const double gap = crm_dot(out->ref.m, crm_between(a, out->a, b, next));
+        out->tied = 1;
+        if (gap < out->gap) {
+            out->b = next;
+            out->gap = gap;
         }
     }
-    return r;
 }
 
 int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closest *out)
@@ -140,14 +144,14 @@ int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closes
             edges = border_behind(a, b, &c, CW);
         }
         if (!edges) {
-            *out = at_vertices(&c);
+            at_vertices(&c, out);
             return 1;
         }
         const carom_vec2 u = edges & 1 ? c.ua[side] : c.ub[side];
         const corner d = across(a, b, &c, edges, side);
         const double turn = crm_cross(u, d.w);
         if (side == CCW ? turn < 0 : turn > 0) {
-            *out = at_border(a, b, &c, &d, edges, side);
+            at_border(a, b, side == CCW ? &c : &d, edges, out);
             return 1;
         }
         c = d;
