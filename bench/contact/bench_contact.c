@@ -167,13 +167,13 @@ static void run_klu(void *user)
 static void run_cold(void *user)
 {
     bench *b = user;
-    carom_contact_solve(b->solver, &b->c.p, 0, &b->c.x, NULL);
+    carom_contact_solve(b->solver, &b->c.p, CAROM_GUESS_NONE, &b->c.x, NULL);
 }
 
 static void run_warm(void *user)
 {
     bench *b = user;
-    carom_contact_solve(b->solver, &b->c.p, 1, &b->c.x, NULL);
+    carom_contact_solve(b->solver, &b->c.p, CAROM_GUESS_IMPULSES, &b->c.x, NULL);
 }
 
 static void run_adjoint(void *user)
@@ -197,11 +197,12 @@ static void run_case(const char *name, contact_case c, int csv)
     const double klu = b.numeric ? least_time(run_klu, &b) : NAN;
     carom_contact_stats cold;
     carom_contact_stats warm;
-    const carom_status status = carom_contact_solve(b.solver, &b.c.p, 0, &b.c.x, &cold);
+    const carom_status status =
+        carom_contact_solve(b.solver, &b.c.p, CAROM_GUESS_NONE, &b.c.x, &cold);
     double *bars = calloc(3 * (size_t)c.p.n_bodies, sizeof(double));
     b.bars.u = bars;
     for (int i = 0; i < 3; i++) run_warm(&b); /* modes settle */
-    carom_contact_solve(b.solver, &b.c.p, 1, &b.c.x, &warm);
+    carom_contact_solve(b.solver, &b.c.p, CAROM_GUESS_IMPULSES, &b.c.x, &warm);
     const double t_warm = least_time(run_warm, &b);
     const double t_adjoint = least_time(run_adjoint, &b);
     const double t_cold = least_time(run_cold, &b);
@@ -235,8 +236,8 @@ static int run_resting(int rows)
     carom_contact_solver *s;
     if (carom_contact_create(NULL, NULL, &s) < 0) return 1;
     carom_contact_stats st = {0};
-    carom_contact_solve(s, &c.p, 0, &c.x, &st);
-    for (int i = 0; i < 10; i++) carom_contact_solve(s, &c.p, 1, &c.x, &st);
+    carom_contact_solve(s, &c.p, CAROM_GUESS_NONE, &c.x, &st);
+    for (int i = 0; i < 10; i++) carom_contact_solve(s, &c.p, CAROM_GUESS_IMPULSES, &c.x, &st);
     printf("%d contacts, %d factorizations\n", c.p.n_contacts, st.factorizations);
     carom_contact_destroy(s);
     contact_case_free(&c);

@@ -144,20 +144,20 @@ static int count_degenerate(crm_island *s)
 }
 
 static carom_status solve_island(carom_contact_solver *c, const carom_contact_problem *p,
-                                 int island, const unsigned char *guess, carom_contact_stats *stats)
+                                 int island, int use_guess, const carom_contact_solution *x,
+                                 carom_contact_stats *stats)
 {
     const crm_graph *g = &c->graph;
     crm_system_gather(&c->system, g, p, island);
     crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
     s.accept = c->settings.accept;
     s.max_iterations = c->settings.max_iterations;
-    for (int k = 0; guess && k < s.nc; k++)
-        s.mode[k] = guess[g->contact_of[g->contact_ptr[island] + k]];
+    if (use_guess) crm_system_read(&c->system, g, &s, island, x, use_guess);
     const crm_ladder ladder = {&c->memory, &c->lemke, c->settings.max_restarts,
                                c->settings.inexact};
     carom_contact_stage stage;
     double unpolished;
-    carom_status status = crm_ladder_climb(&ladder, &s, guess != NULL, &stage, &unpolished);
+    carom_status status = crm_ladder_climb(&ladder, &s, use_guess, &stage, &unpolished);
     stats->factorizations += s.factorizations;
     stats->iterations += s.iterations;
     if (stage > stats->stage) stats->stage = stage;
@@ -209,7 +209,7 @@ static carom_status solve(carom_contact_solver *c, const carom_contact_problem *
     if (s >= 0) s = crm_solver_prepare(c, p);
     if (s >= 0) s = check_prescribed(c, p);
     for (int i = 0; i < c->graph.n_islands && s >= 0; i++)
-        s = solve_island(c, p, i, use_guess ? x->mode : NULL, stats);
+        s = solve_island(c, p, i, use_guess, x, stats);
     if (s < 0) return s;
     write_solution(c, p, x);
     stats->residual = crm_contact_residual(p, x, c->scratch);

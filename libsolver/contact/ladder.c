@@ -60,7 +60,6 @@ static int is_free(crm_island *s)
 
 static int try_modes(climb *c, carom_contact_stage stage)
 {
-    crm_vec_zero(c->s, c->s->x);
     *c->stage = stage;
     const int done = crm_active_set(c->s, ROUNDS_TRY);
     *c->unpolished = c->s->best_residual;
@@ -74,9 +73,11 @@ static int try_active_sets(climb *c, int use_guess)
         fit_guess(s);
         if (try_modes(c, CAROM_STAGE_GUESS)) return 1;
     }
+    crm_vec_zero(s, s->x);
     set_free_modes(s, 0);
     if (try_modes(c, CAROM_STAGE_FREE)) return 1;
     if (!s->nc) return 0;
+    crm_vec_zero(s, s->x);
     memset(s->mode, CAROM_STICK, (size_t)s->nc);
     return try_modes(c, CAROM_STAGE_STICK);
 }

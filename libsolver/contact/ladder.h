@@ -57,7 +57,7 @@ typedef struct crm_ladder {
     double inexact; /* a point this good ends the restarts early */
 } crm_ladder;
 
-/* Climbs until accepted.  s->mode: the guess, used when use_guess.  CAROM_OK: accepted;
+/* Climbs until accepted.  s->mode and s->x: the guess, when use_guess.  CAROM_OK: accepted;
  * CAROM_E_INFEASIBLE: s->x has the certificate; CAROM_E_NO_SOLUTION: s->best is not accepted;
  * CAROM_E_MEMORY. */
 carom_status crm_ladder_climb(const crm_ladder *l, crm_island *s, int use_guess,

@@ -253,6 +253,38 @@ crm_island crm_system_island(const crm_system *y, const crm_graph *g, const crm_
     return i;
 }
 
+/* Impulse in the island's units: l = D V l^. */
+static double scaled_impulse(double l, double scale, double speed)
+{
+    const double x = scale > 0 ? l / (scale * speed) : 0;
+    return isfinite(x) ? x : 0;
+}
+
+void crm_system_read(const crm_system *y, const crm_graph *g, crm_island *s, int island,
+                     const carom_contact_solution *x, int use_guess)
+{
+    const double speed = y->speed[island];
+    crm_vec_zero(s, s->x);
+    for (int k = 0; k < s->nc; k++) {
+        const int slot = g->contact_ptr[island] + k;
+        const int c = g->contact_of[slot];
+        s->mode[k] = x->mode[c];
+        if (use_guess != CAROM_GUESS_IMPULSES) continue;
+        s->x.n[k] = scaled_impulse(x->ln[c], y->scale_n[slot], speed);
+        s->x.t[k] = scaled_impulse(x->lt[c], y->scale_t[slot], speed);
+    }
+    if (use_guess != CAROM_GUESS_IMPULSES) return;
+    for (int q = 0; q < s->ng; q++) {
+        const int slot = g->group_ptr[island] + q;
+        for (int i = 0; i < g->group_size[slot]; i++) {
+            s->x.z[3 * (s->nb + q) + i] =
+                scaled_impulse(x->le[g->group_row[slot] + i], y->scale_e[3 * slot + i], speed);
+        }
+    }
+    crm_island_defect(s, s->x, s->rest.z); /* J' l, since w = 0 */
+    memcpy(s->x.z, s->rest.z, 3 * (size_t)s->nb * sizeof(double));
+}
+
 /* v = u + V sqrt(W) w.  Where w differs from J' l by rounding of the velocity scale, it becomes
  * J' l: no row can see the change, and (4) then holds for small terms too. */
 static void write_motion(const crm_system *y, const crm_graph *g, const carom_contact_problem *p,

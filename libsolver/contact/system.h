@@ -43,6 +43,11 @@ void crm_system_gather(crm_system *y, const crm_graph *g, const carom_contact_pr
 crm_island crm_system_island(const crm_system *y, const crm_graph *g, const crm_block_pattern *s,
                              int island);
 
+/* Takes the guess of the island's modes, and of its impulses with CAROM_GUESS_IMPULSES, into
+ * s->mode and s->x; impulses that are not finite are 0. */
+void crm_system_read(const crm_system *y, const crm_graph *g, crm_island *s, int island,
+                     const carom_contact_solution *x, int use_guess);
+
 /* Writes the island's best point into the entries of the solution that belong to it. */
 void crm_system_write(const crm_system *y, const crm_graph *g, const carom_contact_problem *p,
                       const crm_island *s, int island, carom_contact_solution *x);

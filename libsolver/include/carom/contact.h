@@ -93,7 +93,15 @@ CAROM_API void carom_contact_destroy(carom_contact_solver *solver);
 /* Bytes held and number of allocations made so far. */
 CAROM_API void carom_contact_memory(const carom_contact_solver *solver, size_t *bytes, long *calls);
 
-/* Solves the problem.  x->mode is the first guess when use_guess.  CAROM_OK: residual <= accept.
+/* What carom_contact_solve may take from x as its first guess. */
+typedef enum carom_contact_guess {
+    CAROM_GUESS_NONE = 0,
+    CAROM_GUESS_MODES = 1,   /* x->mode */
+    CAROM_GUESS_IMPULSES = 2 /* also x->ln, lt, le: of many impulses that give the same motion (a
+                              * box on more feet than it needs) those closest to the guess */
+} carom_contact_guess;
+
+/* Solves the problem.  use_guess: a carom_contact_guess.  CAROM_OK: residual <= accept.
  * CAROM_INEXACT: residual <= inexact.  CAROM_E_INFEASIBLE: no v with J_e v + c_e = 0 and
  * J_n v + c_n >= 0.  CAROM_E_NO_SOLUTION: x holds the best point found, stats its residual (the one
  * exception to "outputs untouched").  stats may be NULL.  Workspace grows and is kept. */
