@@ -330,8 +330,56 @@ static void open_contacts_cost_nothing(void **state)
     for (int i = 0; i < 3; i++) c.u[3 * i + 2] = 1 + i;
     carom_contact_stats st = solve_ok(&c);
     assert_int_equal(st.factorizations, 0);
+    assert_int_equal(st.stage, CAROM_STAGE_NONE);
     assert_near_array("open", 9, c.x.v, c.u, 0);
     contact_case_free(&c);
+}
+
+/* Of three bodies in free flight, a box at rest, a chain of two, a box above the ground and a box
+ * that rubs on a wall with W = 0, only what touches is in the counts. */
+static void absent_parts_are_left_out(void **state)
+{
+    (void)state;
+    contact_case c = contact_case_new(9, 7, 4);
+    const double zero[2] = {0, 0};
+    const double up[2] = {0, 0.5};
+    for (int i = 0; i < 8; i++) contact_case_body(&c, i, 1, 0.2, 0, 0, -GRAVITY * STEP);
+    add_feet(&c, -1, 3, 0.5);
+    contact_case_hinge(&c, -1, 4, zero, up);
+    contact_case_hinge(&c, 4, 5, zero, up);
+    add_feet(&c, -1, 6, 0.5);
+    c.u[3 * 6 + 2] = 1;
+    add_feet(&c, 8, 7, 0.5);
+    contact_case_contact(&c, -1, 8, zero, zero, UP, 0.5, 0); /* prescribed */
+    const carom_contact_stats st = solve_ok(&c);
+    assert_int_equal(st.islands, 4);
+    assert_int_equal(st.bodies, 5);
+    assert_int_equal(st.contacts, 6);
+    assert_int_equal(st.joint_rows, 4);
+    assert_int_equal(st.factorizations, 3); /* the open box has none */
+    /* Two boxes alone; two links and two hinges, coupled by three pairs, at most all of them. */
+    assert_in_range(st.blocks, 1 + 1 + 4 + 2 * 3, 1 + 1 + 4 * 4);
+    contact_case_free(&c);
+}
+
+/* Islands do not see each other: the same bits with and without a second stack. */
+static void islands_are_solved_apart(void **state)
+{
+    (void)state;
+    contact_case one = make_stack(4, 3, 0.5, 0.03);
+    contact_case two = contact_case_new(7, 14, 0);
+    for (int i = 0; i < 7; i++) {
+        const int first = i < 3;
+        const double m = i == 6 ? 3 : 1;
+        contact_case_body(&two, i, m, m / 6, 0, first ? 2 : 0.03, -GRAVITY * STEP);
+        add_feet(&two, i == 3 ? -1 : i - 1, i, first ? 0.1 : 0.5);
+    }
+    solve_ok(&one);
+    solve_ok(&two);
+    assert_memory_equal(two.x.v + 9, one.x.v, 12 * sizeof(double));
+    assert_memory_equal(two.x.ln + 6, one.x.ln, 8 * sizeof(double));
+    contact_case_free(&one);
+    contact_case_free(&two);
 }
 
 /* Zero tangential row, frictionless contacts whose tangential rows are not numbers, no J_t. */
@@ -666,6 +714,8 @@ int main(void)
         cmocka_unit_test(locked_axis_stays),
         cmocka_unit_test(nothing_to_solve),
         cmocka_unit_test(open_contacts_cost_nothing),
+        cmocka_unit_test(absent_parts_are_left_out),
+        cmocka_unit_test(islands_are_solved_apart),
         cmocka_unit_test(absent_friction_is_left_out),
         cmocka_unit_test(bad_input_is_refused),
         cmocka_unit_test(settings_are_checked),

@@ -160,6 +160,7 @@ static carom_status solve_island(carom_contact_solver *c, const carom_contact_pr
     carom_status status = crm_ladder_climb(&ladder, &s, use_guess, &stage, &unpolished);
     stats->factorizations += s.factorizations;
     stats->iterations += s.iterations;
+    if (s.factorizations) stats->blocks += 2 * (s.lu.lp[s.lu.n] - s.lu.lp[0]) + s.lu.n;
     if (stage > stats->stage) stats->stage = stage;
     if (status == CAROM_E_INFEASIBLE) return give_certificate(c, p, &s, island);
     if (status == CAROM_E_MEMORY) return status;
@@ -193,6 +194,16 @@ static void write_solution(carom_contact_solver *c, const carom_contact_problem 
     }
 }
 
+/* What there is to solve, from the graph. */
+static void count(const carom_contact_solver *c, carom_contact_stats *stats)
+{
+    const crm_graph *g = &c->graph;
+    stats->islands = g->n_islands;
+    stats->bodies = g->n_nodes;
+    stats->contacts = g->n_live;
+    for (int q = 0; q < g->n_groups; q++) stats->joint_rows += g->group_size[q];
+}
+
 static carom_status judge(const carom_contact_settings *s, double residual)
 {
     if (residual <= s->accept) return CAROM_OK;
@@ -208,6 +219,7 @@ static carom_status solve(carom_contact_solver *c, const carom_contact_problem *
                     sizeof(double));
     if (s >= 0) s = crm_solver_prepare(c, p);
     if (s >= 0) s = check_prescribed(c, p);
+    if (s >= 0) count(c, stats);
     for (int i = 0; i < c->graph.n_islands && s >= 0; i++)
         s = solve_island(c, p, i, use_guess, x, stats);
     if (s < 0) return s;

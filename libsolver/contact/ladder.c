@@ -150,7 +150,7 @@ carom_status crm_ladder_climb(const crm_ladder *l, crm_island *s, int use_guess,
                               carom_contact_stage *stage, double *unpolished)
 {
     climb c = {l, s, stage, unpolished, 0};
-    *stage = CAROM_STAGE_FREE;
+    *stage = CAROM_STAGE_NONE;
     *unpolished = 0;
     if (is_free(s) || try_active_sets(&c, use_guess)) return CAROM_OK;
     if (s->nc) {

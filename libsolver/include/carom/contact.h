@@ -63,7 +63,7 @@ typedef struct carom_contact_settings {
 CAROM_API carom_contact_settings carom_contact_defaults(void);
 
 typedef enum carom_contact_stage {
-    CAROM_STAGE_NONE,           /* nothing to solve: no contact and no joint */
+    CAROM_STAGE_NONE,           /* nothing to solve: no joint, no contact that would close */
     CAROM_STAGE_GUESS,          /* the caller's guess of modes held, or led on */
     CAROM_STAGE_FREE,           /* active set from the free motion */
     CAROM_STAGE_STICK,          /* active set from all contacts sticking */
@@ -81,6 +81,12 @@ typedef struct carom_contact_stats {
     int factorizations;
     int iterations; /* interior point */
     int degenerate; /* contacts weakly active or on the slip border within 1e-9 */
+    /* What there was to solve; the rest was left out. */
+    int islands;    /* groups of bodies that contacts and joints connect, solved apart */
+    int bodies;     /* with a free axis, touched by a contact or joint */
+    int contacts;   /* with an impulse that some body feels */
+    int joint_rows; /* likewise */
+    int blocks;     /* 3x3 blocks of the factors, 0 when nothing was factored */
 } carom_contact_stats;
 
 typedef struct carom_contact_solver carom_contact_solver;
