@@ -70,8 +70,9 @@ static void random_pair(rng *r, int lattice, core *a, core *b, crm_placed *pa, c
 
 static crm_closest features(const crm_placed *a, const crm_placed *b, int gjk_min_vertices)
 {
+    const crm_search how = {HUGE_VAL, 0, gjk_min_vertices};
     crm_closest c;
-    crm_closest_features(a, b, HUGE_VAL, gjk_min_vertices, &c);
+    crm_closest_features(a, b, &how, &c);
     return c;
 }
 
@@ -121,14 +122,14 @@ static void check_ways(int lattice, uint64_t seed)
         crm_closest walked;
         if (crm_gjk(&a, &b, crm_vec(1, 0), &x) && is_certified(&a, &b, x)) {
             n_gjk++;
-            assert_int_equal(crm_walk(&a, &b, x, &walked), 1);
+            assert_int_equal(crm_closest_from(&a, &b, x, HUGE_VAL, &walked), 1);
             expect_same("from GJK's axis", k, &walked, &plain);
         }
         for (int turn = 0; turn < 16; turn++) {
             const double t = turn * PI / 8;
             x = axis_along(&a, &b, crm_vec(cos(t), sin(t)));
             if (!is_certified(&a, &b, x)) continue;
-            assert_int_equal(crm_walk(&a, &b, x, &walked), 1);
+            assert_int_equal(crm_closest_from(&a, &b, x, HUGE_VAL, &walked), 1);
             expect_same("from an axis", k, &walked, &plain);
         }
     }

@@ -211,6 +211,16 @@ static void rounding_shifts_points(void **state)
     }
 }
 
+/* Bit for bit, but for the padding. */
+static int same_point(const carom_contact_point *a, const carom_contact_point *b)
+{
+    const carom_recipe r = a->recipe;
+    const carom_recipe s = b->recipe;
+    return a->gap == b->gap && a->arm_a.x == b->arm_a.x && a->arm_a.y == b->arm_a.y &&
+           a->arm_b.x == b->arm_b.x && a->arm_b.y == b->arm_b.y && r.ref == s.ref &&
+           r.inc == s.inc && r.kernel == s.kernel && r.flipped == s.flipped && r.at_end == s.at_end;
+}
+
 /* A margin keeps the points of the unlimited manifold with gap <= margin, and gives none exactly
  * when the distance exceeds it; then it still bounds the distance from below. */
 static void margin_selects(void **state)
@@ -230,7 +240,7 @@ static void margin_selects(void **state)
         for (int i = 0; i < all.count; i++) {
             if (all.points[i].gap > margin) continue;
             assert_true(n < m.count);
-            assert_memory_equal(&m.points[n++], &all.points[i], sizeof m.points[0]);
+            assert_true(same_point(&m.points[n++], &all.points[i]));
         }
         assert_int_equal(m.count, n);
         n_by_count[n]++;

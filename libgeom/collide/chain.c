@@ -197,7 +197,7 @@ carom_manifold carom_collide_chain(const carom_chain *chain, int link, carom_pos
     const crm_placed pb = crm_place(b, &fb, crm_vec(fb.x - fa.x, fb.y - fa.y));
     const double radii = chain->radius + b->radius;
     crm_closest c;
-    crm_features(&k.p, &pb, margin + radii, &c);
+    crm_features(&k.p, &pb, margin + radii, 0, &c);
     if (c.kind == CRM_APART) return crm_no_contact(c.gap - radii);
     carom_manifold m = crm_no_contact(HUGE_VAL);
     answer(&k, &pb, &c, &m);

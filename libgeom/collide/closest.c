@@ -24,11 +24,16 @@ static double coordinates(const crm_placed *p)
     return x > p->radius ? x : p->radius;
 }
 
-double crm_tie(const crm_placed *a, const crm_placed *b)
+double crm_coordinates(const crm_placed *a, const crm_placed *b)
 {
     const double x = coordinates(a);
     const double y = coordinates(b);
-    return TIE_TOL * (x > y ? x : y);
+    return x > y ? x : y;
+}
+
+double crm_tie(const crm_placed *a, const crm_placed *b)
+{
+    return TIE_TOL * crm_coordinates(a, b);
 }
 
 void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b,
@@ -38,6 +43,7 @@ void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int 
     out->a = on_b ? j : edge;
     out->b = on_b ? edge : j;
     out->tied = 0;
+    out->lead = 0;
     out->ref = crm_reference_at(p, edge);
     out->gap = crm_dot(out->ref.m, crm_between(p, edge, q, j));
 }
@@ -48,26 +54,54 @@ static crm_axis axis_along(const crm_placed *a, const crm_placed *b, carom_vec2 
     return x;
 }
 
+/* Distance and reference of features that a walk found; known (may be NULL): those that it left. */
+static void measure(const crm_placed *a, const crm_placed *b, const crm_closest *known,
+                    crm_closest *c)
+{
+    const int tied = c->tied;
+    if (known && known->kind == c->kind && known->a == c->a && known->b == c->b) {
+        *c = *known;
+    } else if (c->kind == CRM_FACE_A) {
+        crm_face_at(a, c->a, b, c->b, 0, c);
+    } else if (c->kind == CRM_FACE_B) {
+        crm_face_at(b, c->b, a, c->a, 1, c);
+    } else {
+        c->gap = crm_length(crm_between(a, c->a, b, c->b));
+    }
+    c->tied = tied;
+    c->lead = 0;
+}
+
+/* h: the height of b over a along x.d, of length `length`. */
+static int walk_from(const crm_placed *a, const crm_placed *b, crm_axis x, double h, double length,
+                     const crm_closest *known, crm_closest *out)
+{
+    crm_closest r;
+    /* h > 0 by rounding alone is no certificate: from there a walk may end anywhere. */
+    if (!(h > crm_noise(a, x.a, b, x.b) * length) || !crm_walk(a, b, x, &r)) return 0;
+    measure(a, b, known, &r);
+    if (!(r.gap > crm_noise(a, r.a, b, r.b))) return 0;
+    *out = r;
+    return 1;
+}
+
 int crm_closest_from(const crm_placed *a, const crm_placed *b, crm_axis x, double reach,
                      crm_closest *out)
 {
     const double h = crm_dot(x.d, crm_between(a, x.a, b, x.b));
     if (!(h > 0)) return 0;
     const double length = crm_length(x.d);
-    /* h > 0 by rounding alone is no certificate: from there a walk may end anywhere. */
-    if (!(h > crm_noise(a, x.a, b, x.b) * length)) return 0;
-    if (h > reach * length) {
+    /* Clearly farther: what is just within reach is for the distance itself to decide. */
+    if (h > (reach + crm_tie(a, b)) * length) {
         out->kind = CRM_APART;
         out->a = x.a;
         out->b = x.b;
         out->tied = 0;
         out->gap = h / length;
+        out->lead = 0;
         return 1;
     }
-    crm_closest r;
-    if (!crm_walk(a, b, x, &r) || !(r.gap > crm_noise(a, r.a, b, r.b))) return 0;
-    *out = r;
-    return 1;
+    return walk_from(a, b, x, h, length, NULL, out);
 }
 
 /* The foot of the vertex is on the face's edge, or the other shape's edge at that vertex lies along
@@ -111,31 +145,32 @@ static void leave_face(const crm_placed *a, const crm_placed *b, double reach, c
     if (face->gap > tol) {
         const carom_vec2 m = face->ref.m;
         const crm_axis x = {face->kind == CRM_FACE_A ? m : crm_neg(m), face->a, face->b};
-        crm_closest_from(a, b, x, reach, face);
+        const crm_closest known = *face;
+        walk_from(a, b, x, face->gap, 1.0, &known, face);
     } else if (face->gap >= -tol) {
         walk_lengthwise(a, b, reach, face);
     }
 }
 
-void crm_closest_features(const crm_placed *a, const crm_placed *b, double reach,
-                          int gjk_min_vertices, crm_closest *out)
+void crm_closest_features(const crm_placed *a, const crm_placed *b, const crm_search *how,
+                          crm_closest *out)
 {
     const int few = a->n <= CRM_FEW && b->n <= CRM_FEW;
     const int n = a->n + b->n;
     crm_axis x;
-    if (!few || n >= gjk_min_vertices) {
+    if (!few || n >= how->gjk_min_vertices) {
         const carom_vec2 between = crm_sub(crm_turn(b, crm_middle(b)), crm_turn(a, crm_middle(a)));
         x = axis_along(a, b, crm_add(crm_sub(b->at, a->at), between));
-        if (crm_closest_from(a, b, x, reach, out)) return;
+        if (crm_closest_from(a, b, x, how->reach, out)) return;
     }
-    if (n >= gjk_min_vertices) {
+    if (n >= how->gjk_min_vertices) {
         crm_axis y;
-        if (crm_gjk(a, b, x.d, &y) && crm_closest_from(a, b, y, reach, out)) return;
+        if (crm_gjk(a, b, x.d, &y) && crm_closest_from(a, b, y, how->reach, out)) return;
     }
     if (few) {
-        crm_sweep_few(a, b, reach, out);
+        crm_sweep_few(a, b, how->reach, out);
     } else {
-        crm_sweep(a, b, &x, reach, out);
+        crm_sweep(a, b, &x, how->reach, how->slack, out);
     }
-    if (out->kind != CRM_APART) leave_face(a, b, reach, out);
+    if (out->kind != CRM_APART) leave_face(a, b, how->reach, out);
 }

@@ -9,7 +9,7 @@ typedef enum crm_closest_kind {
     CRM_VERTICES, /* vertex `a` of A, vertex `b` of B */
     CRM_FACE_A,   /* edge `a` of A, vertex `b` of B */
     CRM_FACE_B,   /* vertex `a` of A, edge `b` of B */
-    CRM_APART     /* farther than the reach; `gap` is a lower bound */
+    CRM_APART     /* clearly farther than the reach; `gap` is a lower bound */
 } crm_closest_kind;
 
 typedef struct crm_closest {
@@ -18,13 +18,14 @@ typedef struct crm_closest {
     int b;
     int tied;          /* another face is as good within rounding */
     double gap;        /* signed distance of the cores [m] */
+    double lead;       /* of a swept face over the next best one, at least [m] */
     crm_reference ref; /* faces: the edge */
 } crm_closest;
 
 /* What rounding may add to a distance between these vertices. */
 double crm_noise(const crm_placed *a, int i, const crm_placed *b, int j);
 
-/* Edge `edge` of p, vertex j of q; on_b: p is B. */
+/* Edge `edge` of p, vertex j of q; on_b: p is B.  Not tied, no lead. */
 void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b,
                  crm_closest *out);
 
@@ -38,8 +39,8 @@ typedef struct crm_axis {
     int b;
 } crm_axis;
 
-/* From a certified axis to the closest features (docs/math/equations.md, end of section 5).
- * 0: not found, the certificate was rounding. */
+/* From a certified axis to the closest features (docs/math/equations.md, end of section 5): kind,
+ * a, b and tied of *out.  0: not found, the certificate was rounding. */
 int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closest *out);
 
 /* The face of largest separation, O(n_a + n_b); the distance when the cores overlap.  Of the faces
@@ -47,13 +48,15 @@ int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closes
  * its support vertices, to begin with.  CRM_APART: a face separates by more than reach.  Not both
  * may be points. */
 void crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach,
-               crm_closest *out);
+               double slack, crm_closest *out);
 
 /* The same where neither core has more than CRM_FEW vertices. */
 enum { CRM_FEW = 8 };
 void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_closest *out);
 
-/* Faces whose heights differ by less are tied [m]. */
+/* The size of the coordinates that heights come from [m], and the part of it below which faces are
+ * tied. */
+double crm_coordinates(const crm_placed *a, const crm_placed *b);
 double crm_tie(const crm_placed *a, const crm_placed *b);
 
 /* libccd's GJK.  1: it says disjoint and *axis is its last direction with our support vertices, yet
@@ -65,9 +68,16 @@ int crm_gjk(const crm_placed *a, const crm_placed *b, carom_vec2 first, crm_axis
 /* Pairs with fewer vertices skip GJK.  A setting of speed: the answer does not depend on it. */
 enum { CRM_GJK_MIN_VERTICES = 256 };
 
-/* reach [m]: give up (CRM_APART) when farther; HUGE_VAL: never.  Not both may be points. */
-void crm_closest_features(const crm_placed *a, const crm_placed *b, double reach,
-                          int gjk_min_vertices, crm_closest *out);
+/* reach [m]: give up (CRM_APART) when farther; HUGE_VAL: never.  slack: see crm_sweep.  Not both
+ * may be points. */
+typedef struct crm_search {
+    double reach;
+    double slack;
+    int gjk_min_vertices;
+} crm_search;
+
+void crm_closest_features(const crm_placed *a, const crm_placed *b, const crm_search *how,
+                          crm_closest *out);
 
 /* The same from an axis that may or may not be certified, when it leads there; 0: it does not, and
  * *out is not touched. */

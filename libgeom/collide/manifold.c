@@ -155,14 +155,17 @@ void crm_manifold_of(const crm_placed *a, const crm_placed *b, const crm_closest
     }
 }
 
-void crm_features(const crm_placed *a, const crm_placed *b, double reach, crm_closest *out)
+void crm_features(const crm_placed *a, const crm_placed *b, double reach, double slack,
+                  crm_closest *out)
 {
     if (a->n > 1 || b->n > 1) {
-        crm_closest_features(a, b, reach, CRM_GJK_MIN_VERTICES, out);
+        const crm_search how = {reach, slack, CRM_GJK_MIN_VERTICES};
+        crm_closest_features(a, b, &how, out);
         return;
     }
     out->kind = CRM_VERTICES;
     out->a = out->b = 0;
     out->gap = crm_length(crm_between(a, 0, b, 0));
     out->tied = !(out->gap > 0);
+    out->lead = 0;
 }

@@ -14,6 +14,7 @@ void crm_manifold_of(const crm_placed *a, const crm_placed *b, const crm_closest
                      carom_manifold *out);
 
 /* Closest features of any two placed shapes, circles too. */
-void crm_features(const crm_placed *a, const crm_placed *b, double reach, crm_closest *out);
+void crm_features(const crm_placed *a, const crm_placed *b, double reach, double slack,
+                  crm_closest *out);
 
 #endif

@@ -81,21 +81,21 @@ static faces faces_of(const crm_placed *p, const crm_placed *q, int i, int j)
 
 typedef struct top {
     double height;
-    double second; /* of the other faces, when it is within the tie */
-    double tie;
+    double second; /* of the other faces, when it is within the slack */
+    double slack;
     int edge;
     int vertex;
     int on_b;
 } top;
 
-/* Offers the faces of f, but for those that are surely lower by more than the tie than the top or
+/* Offers the faces of f, but for those that are surely lower by more than the slack than the top or
  * than at_least, a height known to be reached. */
 static void offer_faces(const faces *f, int on_b, double at_least, top *t)
 {
     const crm_placed *p = f->p;
     if (p->n == 1) return;
     const carom_vec2 x = seen(f, f->q->v[f->vertex]);
-    double least = (at_least > t->height ? at_least : t->height) - 2 * t->tie;
+    double least = (at_least > t->height ? at_least : t->height) - t->slack;
     double key = signed_square(least);
     carom_vec2 v = p->v[p->n - 1];
     for (int i = 0; i < p->n; i++) {
@@ -113,7 +113,7 @@ static void offer_faces(const faces *f, int on_b, double at_least, top *t)
             t->edge = k;
             t->vertex = j;
             t->on_b = on_b;
-            if (h - 2 * t->tie > least) least = h - 2 * t->tie;
+            if (h - t->slack > least) least = h - t->slack;
             key = signed_square(least);
         } else if (h > t->second) {
             t->second = h;
@@ -136,21 +136,24 @@ static void first_of_tied(const faces *f, int on_b, double least, int *found, to
 }
 
 void crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach,
-               crm_closest *out)
+               double slack, crm_closest *out)
 {
     const faces fa = faces_of(a, b, x->a, x->b);
     const faces fb = faces_of(b, a, x->b, x->a);
-    top t = {-HUGE_VAL, -HUGE_VAL, crm_tie(a, b), 0, 0, 0};
+    const double tie = crm_tie(a, b);
     const double known = fa.height > fb.height ? fa.height : fb.height;
+    top t = {-HUGE_VAL, -HUGE_VAL, slack > 2 * tie ? slack : 2 * tie, 0, 0, 0};
     offer_faces(&fa, 0, known, &t);
     offer_faces(&fb, 1, known, &t);
-    const int tied = t.second >= t.height - t.tie;
+    const double lead = t.height - t.second;
+    const int tied = lead <= tie;
     if (tied) {
         int found = 0;
-        first_of_tied(&fa, 0, t.height - t.tie, &found, &t);
-        first_of_tied(&fb, 1, t.height - t.tie, &found, &t);
+        first_of_tied(&fa, 0, t.height - tie, &found, &t);
+        first_of_tied(&fb, 1, t.height - tie, &found, &t);
     }
     crm_face_at(t.on_b ? b : a, t.edge, t.on_b ? a : b, t.vertex, t.on_b, out);
     out->tied = tied;
-    if (out->gap > reach) out->kind = CRM_APART;
+    out->lead = lead < t.slack ? lead : t.slack;
+    if (out->gap > reach + tie) out->kind = CRM_APART;
 }

@@ -13,10 +13,11 @@ typedef struct few {
 static void gather(const crm_placed *p, few *f)
 {
     f->n = p->n;
-    for (int i = 0; i < p->n; i++) {
+    int i = 0;
+    do {
         f->x[i] = p->v[i].x;
         f->y[i] = p->v[i].y;
-    }
+    } while (++i < p->n);
     f->x[f->n] = f->x[0];
     f->y[f->n] = f->y[0];
 }
@@ -27,19 +28,21 @@ static void gather_seen(const crm_placed *a, const crm_placed *b, few *f)
     const double s = a->cos * b->sin - a->sin * b->cos;
     const carom_vec2 at = crm_turn_back(a, crm_sub(b->at, a->at));
     f->n = b->n;
-    for (int i = 0; i < b->n; i++) {
+    int i = 0;
+    do {
         const carom_vec2 v = b->v[i];
         f->x[i] = at.x + (c * v.x - s * v.y);
         f->y[i] = at.y + (s * v.x + c * v.y);
-    }
+    } while (++i < b->n);
     f->x[f->n] = f->x[0];
     f->y[f->n] = f->y[0];
 }
 
-/* Keys of p's faces; returns the largest.  A point has none. */
-static double keys_of(const few *p, const few *q, double *key)
+/* Keys of p's faces; the index of the largest, and of that the first.  A point has none. */
+static int keys_of(const few *p, const few *q, double *key)
 {
     double top = -HUGE_VAL;
+    int at = 0;
     for (int k = 0; p->n > 1 && k < p->n; k++) {
         const double ux = p->y[k + 1] - p->y[k];
         const double uy = p->x[k] - p->x[k + 1];
@@ -50,9 +53,10 @@ static double keys_of(const few *p, const few *q, double *key)
         }
         const double s = low - (ux * p->x[k] + uy * p->y[k]);
         key[k] = s * fabs(s) / (ux * ux + uy * uy);
+        at = key[k] > top ? k : at;
         top = key[k] > top ? key[k] : top;
     }
-    return top;
+    return at;
 }
 
 static double height_of(double key)
@@ -78,21 +82,37 @@ static void apart_by(double gap, crm_closest *out)
 {
     out->kind = CRM_APART;
     out->a = out->b = out->tied = 0;
+    out->lead = 0;
     out->gap = gap;
 }
 
-/* The first of n keys that is not below `least`; *tied: there is another. */
-static int first_of(int n, const double *key, double least, int *tied)
+/* The next largest key but that of `at`. */
+static double second_of(int n, const double *key, int at)
 {
-    int first = 0;
-    int count = 0;
-    for (int k = n - 1; k >= 0; k--) {
-        const int in = key[k] >= least;
-        first = in ? k : first;
-        count += in;
+    double second = -HUGE_VAL;
+    for (int k = 0; k < n; k++) {
+        const double x = k == at ? -HUGE_VAL : key[k];
+        second = x > second ? x : second;
     }
-    *tied = count > 1;
-    return first;
+    return second;
+}
+
+static int first_above(int n, const double *key, double least)
+{
+    int k = 0;
+    while (k < n - 1 && !(key[k] >= least)) k++;
+    return k;
+}
+
+static void take_face(const crm_placed *a, const few *fa, const crm_placed *b, const few *fb, int k,
+                      crm_closest *out)
+{
+    const int n_a = a->n > 1 ? a->n : 0;
+    if (k >= n_a) {
+        crm_face_at(b, k - n_a, a, lowest_over(fb, k - n_a, fa), 1, out);
+    } else {
+        crm_face_at(a, k, b, lowest_over(fa, k, fb), 0, out);
+    }
 }
 
 void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_closest *out)
@@ -102,29 +122,31 @@ void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_c
     double key[2 * CRM_FEW];
     gather(a, &fa);
     gather_seen(a, b, &fb);
-    const double top_a = keys_of(&fa, &fb, key);
-    if (top_a > reach * reach) {
-        apart_by(sqrt(top_a), out);
-        return;
-    }
     const int n_a = a->n > 1 ? a->n : 0;
     const int n = n_a + (b->n > 1 ? b->n : 0);
-    const double top_b = keys_of(&fb, &fa, key + n_a);
-    const double top = top_a > top_b ? top_a : top_b;
-    const double height = height_of(top);
-    if (height > reach) {
-        apart_by(height, out);
+    /* Clearly farther: what is just within reach is for the distance itself to decide. */
+    const double tie = crm_tie(a, b);
+    const double far = (reach + tie) * (reach + tie);
+    const int top_a = keys_of(&fa, &fb, key);
+    if (n_a && key[top_a] > far) {
+        apart_by(sqrt(key[top_a]), out);
         return;
     }
-    const double least = height - crm_tie(a, b);
-    const double least_key = least * fabs(least);
-    int tied;
-    /* The root's rounding may lift the key over the top. */
-    const int k = first_of(n, key, least_key < top ? least_key : top, &tied);
-    if (k >= n_a) {
-        crm_face_at(b, k - n_a, a, lowest_over(&fb, k - n_a, &fa), 1, out);
-    } else {
-        crm_face_at(a, k, b, lowest_over(&fa, k, &fb), 0, out);
+    int top = n_a + keys_of(&fb, &fa, key + n_a);
+    if (n == n_a || (n_a && key[top_a] >= key[top])) top = top_a;
+    if (key[top] > far) {
+        apart_by(sqrt(key[top]), out);
+        return;
     }
-    out->tied = tied;
+    take_face(a, &fa, b, &fb, top, out);
+    /* Tied faces: the first of them. */
+    const double second = second_of(n, key, top);
+    const double least = out->gap - tie;
+    if (second >= least * fabs(least)) {
+        const int k = first_above(n, key, least * fabs(least));
+        if (k != top) take_face(a, &fa, b, &fb, k, out);
+        out->tied = 1;
+    } else {
+        out->lead = out->gap - height_of(second);
+    }
 }

@@ -68,18 +68,12 @@ static int border_behind(const crm_placed *a, const crm_placed *b, const corner 
     return (side == CCW ? turn > 0 : turn < 0) ? 1 : 2;
 }
 
-/* The corner across the border. */
+/* The vertices across the border, and w there. */
 static corner across(const crm_placed *a, const crm_placed *b, const corner *c, int edges, int side)
 {
     corner d = *c;
-    if (edges & 1) {
-        d.a = side == CCW ? crm_next(a, c->a) : crm_prev(a, c->a);
-        see_a(a, &d);
-    }
-    if (edges & 2) {
-        d.b = side == CCW ? crm_next(b, c->b) : crm_prev(b, c->b);
-        see_b(b, &d);
-    }
+    if (edges & 1) d.a = side == CCW ? crm_next(a, c->a) : crm_prev(a, c->a);
+    if (edges & 2) d.b = side == CCW ? crm_next(b, c->b) : crm_prev(b, c->b);
     d.w = crm_between(a, d.a, b, d.b);
     return d;
 }
@@ -101,34 +95,21 @@ static corner start_at(const crm_placed *a, const crm_placed *b, int i, int j)
     return c;
 }
 
-static void at_vertices(const corner *c, crm_closest *out)
-{
-    out->kind = CRM_VERTICES;
-    out->a = c->a;
-    out->b = c->b;
-    out->tied = 0;
-    out->gap = crm_length(c->w);
-}
-
 /* before: the corner clockwise of the border. */
 static void at_border(const crm_placed *a, const crm_placed *b, const corner *before, int edges,
                       crm_closest *out)
 {
-    if (!(edges & 1)) {
-        crm_face_at(b, before->b, a, before->a, 1, out);
-        return;
-    }
-    crm_face_at(a, before->a, b, before->b, 0, out);
-    if (edges & 2) {
+    out->kind = edges & 1 ? CRM_FACE_A : CRM_FACE_B;
+    out->a = before->a;
+    out->b = before->b;
+    out->tied = edges == 3;
+    if (edges == 3) {
         /* The lower end of B's edge, which runs from before->b to the next; of equal ones its
          * start. */
+        const carom_vec2 m = crm_reference_at(a, before->a).m;
         const int next = crm_next(b, before->b);
-        const double gap = crm_dot(out->ref.m, crm_between(a, out->a, b, next));
-        out->tied = 1;
-        if (gap < out->gap) {
-            out->b = next;
-            out->gap = gap;
-        }
+        const double start = crm_dot(m, crm_between(a, before->a, b, before->b));
+        if (crm_dot(m, crm_between(a, before->a, b, next)) < start) out->b = next;
     }
 }
 
@@ -144,16 +125,20 @@ int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closes
             edges = border_behind(a, b, &c, CW);
         }
         if (!edges) {
-            at_vertices(&c, out);
+            out->kind = CRM_VERTICES;
+            out->a = c.a;
+            out->b = c.b;
+            out->tied = 0;
             return 1;
         }
-        const carom_vec2 u = edges & 1 ? c.ua[side] : c.ub[side];
-        const corner d = across(a, b, &c, edges, side);
-        const double turn = crm_cross(u, d.w);
+        corner d = across(a, b, &c, edges, side);
+        const double turn = crm_cross(edges & 1 ? c.ua[side] : c.ub[side], d.w);
         if (side == CCW ? turn < 0 : turn > 0) {
             at_border(a, b, side == CCW ? &c : &d, edges, out);
             return 1;
         }
+        if (edges & 1) see_a(a, &d);
+        if (edges & 2) see_b(b, &d);
         c = d;
     }
     return 0;

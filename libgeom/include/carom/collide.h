@@ -66,16 +66,19 @@ typedef struct carom_frame {
 
 CAROM_API carom_frame carom_frame_at(carom_pose pose);
 
-/* Where a pair was closest: where to look first next time.  All zero: not known yet. */
+/* What one pair remembers from one call to the next.  All zero: nothing; to be zeroed when the
+ * vertices of either shape change. */
 typedef struct carom_pair_cache {
     int kind;
     int a;
     int b;
+    double slack;     /* how far B may move until a proof ends [m] */
+    double reach;     /* [m] */
+    carom_frame pose; /* of B seen from A, at the proof */
 } carom_pair_cache;
 
-/* carom_collide from frames.  cache (may be NULL) is read and written; whatever it holds of this
- * pair of shapes, points and distance are the same bit for bit; only the bound given with count = 0
- * may be another. */
+/* carom_collide from frames.  cache (may be NULL) is read and written; it saves time and changes
+ * nothing, bit for bit, but the bound given as distance with count = 0. */
 CAROM_API carom_manifold carom_collide_frames(const carom_shape *a, const carom_frame *frame_a,
                                               const carom_shape *b, const carom_frame *frame_b,
                                               double margin, carom_pair_cache *cache);
