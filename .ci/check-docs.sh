@@ -41,6 +41,13 @@ for page in docs/*.md docs/math/*.md; do
     [ "$link" = README.md ] || grep -qF "]($link)" docs/README.md || error "docs/README.md does not list $link"
 done
 
+# Pages that the code refers to.
+grep -rhoE --include='*.[ch]' --include='*.py' --include='*.lcm' 'docs/[a-z/_-]+\.md' \
+    libgeom libsolver proto daemon clients tests bench | sort -u >"$work/pages"
+while IFS= read -r page; do
+    [ -f "$page" ] || error "the code refers to $page, which does not exist"
+done <"$work/pages"
+
 grep -rhoE --include='*.[ch]' --include='*.py' '(equations\.md|EQUATIONS) \([0-9]+\)' \
     libgeom libsolver proto daemon clients tests | sed 's/.*(//; s/)//' | sort -nu >"$work/cited"
 while IFS= read -r number; do
