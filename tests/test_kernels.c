@@ -294,10 +294,40 @@ static void check_scaling(const char *name, scene *k, gradient g[2])
     assert_near_case(name, 0, sum, expected, 1e-13 * size);
 }
 
+/* <bar, J dot> = <J' bar, dot> for a random tangent. */
+static void check_forward(const char *name, scene *k, gradient g[2])
+{
+    rng r = rng_from(1 + (uint64_t)k->recipe.ref);
+    gradient t[2];
+    double *dot_entry[N_PARAMETERS];
+    double *bar_entry[N_PARAMETERS];
+    const int n = gradient_entries(t, dot_entry);
+    gradient_entries(g, bar_entry);
+    double expected = 0;
+    double size = 1;
+    for (int i = 0; i < n; i++) {
+        *dot_entry[i] = rng_uniform(&r, -1, 1);
+        expected += *dot_entry[i] * *bar_entry[i];
+        size += fabs(*dot_entry[i] * *bar_entry[i]);
+    }
+    carom_shape_dot dots[2];
+    for (int s = 0; s < 2; s++) {
+        dots[s].pose = t[s].bar.pose;
+        dots[s].radius = t[s].bar.radius;
+        dots[s].vertices = t[s].v;
+    }
+    const carom_contact_dot d = carom_contact_jvp(&k->s[0].shape, k->s[0].pose, &k->s[1].shape,
+                                                  k->s[1].pose, k->recipe, &dots[0], &dots[1]);
+    const double actual = dot(k->bar.normal, d.normal) + dot(k->bar.arm_a, d.arm_a) +
+                          dot(k->bar.arm_b, d.arm_b) + k->bar.gap * d.gap;
+    assert_near_case(name, 0, actual, expected, 1e-13 * size);
+}
+
 static void check_all(const char *name, scene *k, int differences)
 {
     gradient g[2];
     vjp(k, g);
+    check_forward(name, k, g);
     check_values(name, k);
     check_complex_step(name, k, g);
     check_motions(name, k, g);
@@ -438,6 +468,29 @@ static void coincident_points(void **state)
     assert_true(g[0].bar.pose.x == -7 && g[0].bar.pose.y == 0);
     assert_true(g[1].bar.pose.x == 7 && g[1].bar.pose.y == 0);
     assert_true(g[0].bar.radius == 3 - 7 && g[1].bar.radius == -5 - 7);
+    check_forward("coincident", &k, g);
+}
+
+/* Vertices that rest: the tangent of the poses alone, a disc rising over a level edge. */
+static void forward_without_vertices(void **state)
+{
+    (void)state;
+    scene k;
+    memset(&k, 0, sizeof k);
+    k.s[0].shape = (carom_shape){0.25, 2, k.s[0].v};
+    k.s[1].shape = (carom_shape){0.5, 1, k.s[1].v};
+    k.s[0].v[0].x = 2;
+    k.s[0].v[1].x = -2;
+    k.s[1].pose.x = 0.75;
+    k.s[1].pose.y = 3;
+    k.recipe.kernel = CAROM_EDGE_VERTEX;
+    const carom_shape_dot a = {{1, 0, 0}, 0, NULL};
+    const carom_shape_dot b = {{0, 0, 2}, 0.5, NULL};
+    const carom_contact_dot d =
+        carom_contact_jvp(&k.s[0].shape, k.s[0].pose, &k.s[1].shape, k.s[1].pose, k.recipe, &a, &b);
+    assert_near(d.gap, 2 - 0.75 - 0.5, 8 * DBL_EPSILON);
+    assert_near(d.normal.x, -1, 8 * DBL_EPSILON);
+    assert_near(d.normal.y, 0, 8 * DBL_EPSILON);
 }
 
 /* An incident edge square to the reference edge is not cut by its side plane. */
@@ -460,6 +513,7 @@ static void square_incident_edge(void **state)
     double *entry[N_PARAMETERS];
     const int count = gradient_entries(g, entry);
     for (int i = 0; i < count; i++) assert_true(isfinite(*entry[i]));
+    check_forward("square", &k, g);
 }
 
 int main(void)
@@ -467,7 +521,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(kernels_and_derivatives), cmocka_unit_test(recipes_of_manifolds),
         cmocka_unit_test(cotangents_accumulate),   cmocka_unit_test(disc_over_edge),
-        cmocka_unit_test(coincident_points),       cmocka_unit_test(square_incident_edge),
+        cmocka_unit_test(coincident_points),       cmocka_unit_test(forward_without_vertices),
+        cmocka_unit_test(square_incident_edge),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

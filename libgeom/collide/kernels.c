@@ -1,4 +1,4 @@
-/* kernels.c: contact points from their recipes, and the reverse derivatives. */
+/* kernels.c: contact points from their recipes; reverse and forward derivatives. */
 #include "collide/kernels.h"
 
 #include <assert.h>
@@ -201,4 +201,100 @@ void carom_contact_vjp(const carom_shape *a, carom_pose pose_a, const carom_shap
     } else {
         edge_point_vjp(&k, recipe, bar, a_bar, b_bar);
     }
+}
+
+/* R v moves by angle_dot left(R v) + R v_dot. */
+static carom_vec2 arm_jvp(const crm_placed *p, int i, const carom_shape_dot *dot)
+{
+    const carom_vec2 turn = crm_scale(dot->pose.angle, crm_left(crm_arm(p, i)));
+    return dot->vertices ? crm_add(turn, crm_turn(p, dot->vertices[i])) : turn;
+}
+
+static carom_vec2 edge_jvp(const crm_placed *p, int k, const carom_shape_dot *dot)
+{
+    const carom_vec2 turn = crm_scale(dot->pose.angle, crm_left(crm_edge(p, k)));
+    if (!dot->vertices) return turn;
+    const carom_vec2 e = crm_sub(dot->vertices[crm_next(p, k)], dot->vertices[k]);
+    return crm_add(turn, crm_turn(p, e));
+}
+
+static carom_vec2 offset_jvp(const carom_shape_dot *first, const carom_shape_dot *second)
+{
+    return crm_vec(second->pose.x - first->pose.x, second->pose.y - first->pose.y);
+}
+
+static carom_contact_dot point_point_jvp(const crm_placed *a, const crm_placed *b, carom_recipe r,
+                                         const carom_shape_dot *a_dot, const carom_shape_dot *b_dot)
+{
+    const point_point k = point_point_at(crm_between(a, r.ref, b, r.inc));
+    const carom_vec2 arm_a = arm_jvp(a, r.ref, a_dot);
+    const carom_vec2 arm_b = arm_jvp(b, r.inc, b_dot);
+    const carom_vec2 u = crm_add(offset_jvp(a_dot, b_dot), crm_sub(arm_b, arm_a));
+    const double l = crm_dot(k.n, u);
+    const carom_vec2 across = crm_add_scaled(u, -l, k.n);
+    carom_contact_dot out;
+    out.normal = k.l > 0 ? crm_scale(1.0 / k.l, across) : crm_vec(0, 0);
+    out.arm_a = crm_add_scaled(arm_a, a_dot->radius, k.n);
+    out.arm_a = crm_add_scaled(out.arm_a, a->radius, out.normal);
+    out.arm_b = crm_add_scaled(arm_b, -b_dot->radius, k.n);
+    out.arm_b = crm_add_scaled(out.arm_b, -b->radius, out.normal);
+    out.gap = l - (a_dot->radius + b_dot->radius);
+    return out;
+}
+
+/* tau = N / slope: tau_dot = (N_dot - tau slope_dot) / slope. */
+static carom_vec2 clip_jvp(const edge_point *k, carom_recipe r, carom_vec2 e_dot, carom_vec2 d_dot,
+                           const carom_shape_dot *p_dot, const carom_shape_dot *q_dot)
+{
+    const int end = r.at_end ? crm_next(k->p, r.ref) : r.ref;
+    const carom_vec2 i_dot = arm_jvp(k->q, r.inc, q_dot);
+    const carom_vec2 w_dot = edge_jvp(k->q, r.inc, q_dot);
+    const carom_vec2 cut_dot = crm_sub(crm_sub(arm_jvp(k->p, end, p_dot), i_dot), d_dot);
+    const double n_dot = crm_dot(e_dot, k->at.cut) + crm_dot(k->ref.e, cut_dot);
+    const double slope_dot = crm_dot(e_dot, k->at.w) + crm_dot(k->ref.e, w_dot);
+    const double tau_dot = k->at.slope != 0 ? (n_dot - k->at.tau * slope_dot) / k->at.slope : 0.0;
+    return crm_add(i_dot, crm_add_scaled(crm_scale(k->at.tau, w_dot), tau_dot, k->at.w));
+}
+
+/* Seen from the reference shape: arm_a is on p, arm_b on q. */
+static carom_contact_dot edge_point_jvp(const edge_point *k, carom_recipe r,
+                                        const carom_shape_dot *p_dot, const carom_shape_dot *q_dot)
+{
+    const carom_vec2 e_dot = edge_jvp(k->p, r.ref, p_dot);
+    const carom_vec2 d_dot = offset_jvp(p_dot, q_dot);
+    const carom_vec2 m_dot = crm_scale(-crm_dot(k->ref.m, e_dot) / k->ref.length, k->ref.t);
+    const carom_vec2 arm_dot = r.kernel == CAROM_EDGE_CLIPPED
+                                   ? clip_jvp(k, r, e_dot, d_dot, p_dot, q_dot)
+                                   : arm_jvp(k->q, r.inc, q_dot);
+    const carom_vec2 x_dot = crm_add(d_dot, crm_sub(arm_dot, arm_jvp(k->p, r.ref, p_dot)));
+    const double h_dot = crm_dot(m_dot, k->at.x) + crm_dot(k->ref.m, x_dot);
+    carom_contact_dot out;
+    out.normal = m_dot;
+    out.arm_a = crm_add_scaled(crm_add(arm_dot, d_dot), p_dot->radius - h_dot, k->ref.m);
+    out.arm_a = crm_add_scaled(out.arm_a, k->p->radius - k->at.h, m_dot);
+    out.arm_b = crm_add_scaled(arm_dot, -q_dot->radius, k->ref.m);
+    out.arm_b = crm_add_scaled(out.arm_b, -k->q->radius, m_dot);
+    out.gap = h_dot - (p_dot->radius + q_dot->radius);
+    return out;
+}
+
+carom_contact_dot carom_contact_jvp(const carom_shape *a, carom_pose pose_a, const carom_shape *b,
+                                    carom_pose pose_b, carom_recipe recipe,
+                                    const carom_shape_dot *a_dot, const carom_shape_dot *b_dot)
+{
+    crm_placed pa;
+    crm_placed pb;
+    place_pair(a, pose_a, b, pose_b, &pa, &pb);
+    if (recipe.kernel == CAROM_POINT_POINT) {
+        return point_point_jvp(&pa, &pb, recipe, a_dot, b_dot);
+    }
+    edge_point k;
+    if (!recipe.flipped) {
+        see_edge_point(&pa, &pb, recipe, &k);
+        return edge_point_jvp(&k, recipe, a_dot, b_dot);
+    }
+    see_edge_point(&pb, &pa, recipe, &k);
+    const carom_contact_dot r = edge_point_jvp(&k, recipe, b_dot, a_dot);
+    const carom_contact_dot out = {crm_neg(r.normal), r.arm_b, r.arm_a, r.gap};
+    return out;
 }

@@ -113,6 +113,27 @@ CAROM_API void carom_contact_vjp(const carom_shape *a, carom_pose pose_a, const 
                                  const carom_contact_bar *bar, carom_shape_bar *a_bar,
                                  carom_shape_bar *b_bar);
 
+/* Tangent of one posed shape; vertices (count of them) may be NULL: they rest. */
+typedef struct carom_shape_dot {
+    carom_pose pose;
+    double radius;
+    const carom_vec2 *vertices;
+} carom_shape_dot;
+
+/* Tangent of one contact point. */
+typedef struct carom_contact_dot {
+    carom_vec2 normal;
+    carom_vec2 arm_a;
+    carom_vec2 arm_b;
+    double gap;
+} carom_contact_dot;
+
+/* Forward derivative of carom_contact_eval: the transpose of carom_contact_vjp. */
+CAROM_API carom_contact_dot carom_contact_jvp(const carom_shape *a, carom_pose pose_a,
+                                              const carom_shape *b, carom_pose pose_b,
+                                              carom_recipe recipe, const carom_shape_dot *a_dot,
+                                              const carom_shape_dot *b_dot);
+
 #ifdef __cplusplus
 }
 #endif

@@ -75,6 +75,17 @@ CAROM_API void carom_shape_mass_vjp(const carom_shape *shape, double density,
                                     carom_mass_properties bar, double *density_bar,
                                     double *radius_bar, carom_vec2 *vertices_bar);
 
+/* A shape of a body that has several: out[i] = R(offset.angle) in[i] + (offset.x, offset.y), n of
+ * them; out may be in. */
+CAROM_API void carom_vertices_place(int n, const carom_vec2 *in, carom_pose offset,
+                                    carom_vec2 *out);
+
+/* Reverse derivative: adds the gradient of <out_bar, out> to *offset_bar and in_bar[n] (each may be
+ * NULL; in_bar must not be out_bar). */
+CAROM_API void carom_vertices_place_vjp(int n, const carom_vec2 *in, carom_pose offset,
+                                        const carom_vec2 *out_bar, carom_pose *offset_bar,
+                                        carom_vec2 *in_bar);
+
 #ifdef __cplusplus
 }
 #endif
