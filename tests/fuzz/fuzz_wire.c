@@ -13,14 +13,14 @@
 #define ROUND_TRIP(message)                                                                        \
     {                                                                                              \
         message m;                                                                                 \
-        if (message##_decode(bytes, 0, size, &m) != size) abort();                                 \
+        if (message##_decode(data, 0, size, &m) != size) abort();                                  \
         if (message##_encoded_size(&m) != size) abort();                                           \
         if (message##_encode(again, 0, size, &m) != size) abort();                                 \
         message##_decode_cleanup(&m);                                                              \
     }
 
 /* Aborts when a message that passed the check does not survive decoding and encoding. */
-static void round_trip(crm_wire_type type, const unsigned char *bytes, int size)
+static void round_trip(crm_wire_type type, const unsigned char *data, int size)
 {
     unsigned char *again = malloc((size_t)size);
     if (!again) abort();
@@ -38,7 +38,7 @@ static void round_trip(crm_wire_type type, const unsigned char *bytes, int size)
     case CRM_WIRE_STATUS: ROUND_TRIP(carom_status_t) break;
     case CRM_WIRE_N_TYPES: abort();
     }
-    if (memcmp(bytes, again, (size_t)size) != 0) abort();
+    if (memcmp(data, again, (size_t)size) != 0) abort();
     free(again);
 }
 
