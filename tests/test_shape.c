@@ -1,5 +1,4 @@
-/* Validation of shapes, fault by fault; mass properties against closed forms, against the moments
- * of the outline, and their derivatives against central differences. */
+/* Validation of shapes, fault by fault; shapes offset in their body's frame. */
 #include "carom/shape.h"
 #include "fdiff.h"
 #include "near.h"

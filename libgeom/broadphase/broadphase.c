@@ -1,27 +1,10 @@
-/* broadphase.c: pairs of overlapping boxes: all pairs when they are few, else sort and sweep. */
-#include "carom/broadphase.h"
-
-#include "base/memory.h"
+/* broadphase.c: the object, all pairs of a few boxes, and the order of the pairs. */
+#include "broadphase/internal.h"
 
 #include <limits.h>
 
-/* Below this many boxes all pairs are tested: a setting of speed. */
+/* Up to this many boxes all pairs are tested: a setting of speed. */
 enum { ALL_PAIRS_MAX = 64 };
-
-struct carom_broadphase {
-    crm_memory memory;
-    carom_pair *pairs;
-    int n_pairs;
-    int pairs_max;
-    carom_pair *scratch; /* pairs_max when sorting */
-    int scratch_max;
-    int *order; /* boxes by their lower x, ties by index */
-    int order_max;
-    int *merge;
-    int merge_max;
-    int *count; /* buckets of the pairs' sort */
-    int count_max;
-};
 
 carom_status carom_broadphase_create(const carom_allocator *allocator, carom_broadphase **out)
 {
@@ -40,9 +23,12 @@ void carom_broadphase_destroy(carom_broadphase *bp)
     crm_memory memory = bp->memory;
     crm_free(&memory, bp->pairs, (size_t)bp->pairs_max, sizeof *bp->pairs);
     crm_free(&memory, bp->scratch, (size_t)bp->scratch_max, sizeof *bp->scratch);
-    crm_free(&memory, bp->order, (size_t)bp->order_max, sizeof *bp->order);
-    crm_free(&memory, bp->merge, (size_t)bp->merge_max, sizeof *bp->merge);
-    crm_free(&memory, bp->count, (size_t)bp->count_max, sizeof *bp->count);
+    crm_free(&memory, bp->order.at, (size_t)bp->order.n_max, sizeof *bp->order.at);
+    crm_free(&memory, bp->other.at, (size_t)bp->other.n_max, sizeof *bp->other.at);
+    crm_free(&memory, bp->large.at, (size_t)bp->large.n_max, sizeof *bp->large.at);
+    crm_free(&memory, bp->key.at, (size_t)bp->key.n_max, sizeof *bp->key.at);
+    crm_free(&memory, bp->other_key.at, (size_t)bp->other_key.n_max, sizeof *bp->other_key.at);
+    crm_free(&memory, bp->sorted.at, (size_t)bp->sorted.n_max, sizeof *bp->sorted.at);
     crm_free(&memory, bp, 1, sizeof *bp);
 }
 
@@ -52,30 +38,51 @@ void carom_broadphase_memory(const carom_broadphase *bp, size_t *bytes, long *ca
     *calls = bp->memory.n_calls;
 }
 
-static int overlap_x(const carom_box *a, const carom_box *b)
+carom_broadphase_stats carom_broadphase_statistics(const carom_broadphase *bp)
 {
-    return a->lower.x <= b->upper.x && b->lower.x <= a->upper.x;
+    return bp->stats;
 }
 
-static int overlap_y(const carom_box *a, const carom_box *b)
+carom_status crm_ints_reserve(carom_broadphase *bp, crm_ints *p, int need)
 {
-    return a->lower.y <= b->upper.y && b->lower.y <= a->upper.y;
+    void *at = p->at;
+    const carom_status e = crm_reserve(&bp->memory, &at, &p->n_max, need, sizeof *p->at);
+    p->at = at;
+    return e;
 }
 
-/* NaN anywhere makes it empty. */
-static int is_empty(const carom_box *a)
+carom_status crm_keys_reserve(carom_broadphase *bp, crm_keys *p, int need)
 {
-    return !(a->lower.x <= a->upper.x && a->lower.y <= a->upper.y);
+    void *at = p->at;
+    const carom_status e = crm_reserve(&bp->memory, &at, &p->n_max, need, sizeof *p->at);
+    p->at = at;
+    return e;
 }
 
-static carom_status add_pair(carom_broadphase *bp, int i, int j)
+carom_status crm_boxes_reserve(carom_broadphase *bp, crm_boxes *p, int need)
+{
+    void *at = p->at;
+    const carom_status e = crm_reserve(&bp->memory, &at, &p->n_max, need, sizeof *p->at);
+    p->at = at;
+    return e;
+}
+
+static carom_status grow_pairs(carom_broadphase *bp)
 {
     if (bp->n_pairs == INT_MAX) return CAROM_E_CAPACITY;
     void *p = bp->pairs;
     const carom_status e =
         crm_reserve(&bp->memory, &p, &bp->pairs_max, bp->n_pairs + 1, sizeof *bp->pairs);
     bp->pairs = p;
-    if (e) return e;
+    return e;
+}
+
+carom_status crm_pair_add(carom_broadphase *bp, int i, int j)
+{
+    if (bp->n_pairs == bp->pairs_max) {
+        const carom_status e = grow_pairs(bp);
+        if (e) return e;
+    }
     carom_pair *pair = &bp->pairs[bp->n_pairs++];
     pair->a = i < j ? i : j;
     pair->b = i < j ? j : i;
@@ -84,68 +91,13 @@ static carom_status add_pair(carom_broadphase *bp, int i, int j)
 
 static carom_status all_pairs(carom_broadphase *bp, int n, const carom_box *boxes)
 {
+    bp->stats.method = CAROM_ALL_PAIRS;
     for (int i = 0; i < n; i++) {
-        if (is_empty(&boxes[i])) continue;
+        if (crm_box_is_empty(&boxes[i])) continue;
         for (int j = i + 1; j < n; j++) {
-            if (is_empty(&boxes[j]) || !overlap_x(&boxes[i], &boxes[j])) continue;
-            if (!overlap_y(&boxes[i], &boxes[j])) continue;
-            const carom_status e = add_pair(bp, i, j);
-            if (e) return e;
-        }
-    }
-    return CAROM_OK;
-}
-
-static carom_status reserve_ints(carom_broadphase *bp, int **p, int *n_max, int need)
-{
-    void *q = *p;
-    const carom_status e = crm_reserve(&bp->memory, &q, n_max, need, sizeof **p);
-    *p = q;
-    return e;
-}
-
-static int starts_before(const carom_box *boxes, int i, int j)
-{
-    return boxes[i].lower.x < boxes[j].lower.x || (boxes[i].lower.x == boxes[j].lower.x && i < j);
-}
-
-/* Merges from[low..mid) and from[mid..high) into `to`. */
-static void merge_runs(const carom_box *boxes, const int *from, int low, int mid, int high, int *to)
-{
-    int i = low;
-    int j = mid;
-    for (int k = low; k < high; k++) {
-        const int left = i < mid && (j >= high || starts_before(boxes, from[i], from[j]));
-        to[k] = left ? from[i++] : from[j++];
-    }
-}
-
-/* Merge sort of the boxes that are not empty; returns their number. */
-static int sort_boxes(carom_broadphase *bp, int n, const carom_box *boxes)
-{
-    int m = 0;
-    for (int i = 0; i < n; i++) {
-        if (!is_empty(&boxes[i])) bp->order[m++] = i;
-    }
-    for (int width = 1; width<m; width = width> m / 2 ? m : 2 * width) {
-        for (int low = 0; low < m;) {
-            const int mid = width < m - low ? low + width : m;
-            const int high = width < m - mid ? mid + width : m;
-            merge_runs(boxes, bp->order, low, mid, high, bp->merge);
-            low = high;
-        }
-        memcpy(bp->order, bp->merge, (size_t)m * sizeof *bp->order);
-    }
-    return m;
-}
-
-static carom_status sweep(carom_broadphase *bp, int m, const carom_box *boxes)
-{
-    for (int i = 0; i < m; i++) {
-        const carom_box *a = &boxes[bp->order[i]];
-        for (int j = i + 1; j < m && boxes[bp->order[j]].lower.x <= a->upper.x; j++) {
-            if (!overlap_y(a, &boxes[bp->order[j]])) continue;
-            const carom_status e = add_pair(bp, bp->order[i], bp->order[j]);
+            bp->stats.n_tests++;
+            if (!crm_box_overlaps(&boxes[i], &boxes[j]) || crm_box_is_empty(&boxes[j])) continue;
+            const carom_status e = crm_pair_add(bp, i, j);
             if (e) return e;
         }
     }
@@ -168,19 +120,19 @@ static carom_status sort_pairs(carom_broadphase *bp, int n)
     carom_status e =
         crm_reserve(&bp->memory, &p, &bp->scratch_max, bp->n_pairs, sizeof *bp->scratch);
     bp->scratch = p;
-    if (!e) e = reserve_ints(bp, &bp->count, &bp->count_max, n + 1);
+    if (!e) e = crm_ints_reserve(bp, &bp->other, n + 1);
     if (e) return e;
-    sort_by(1, n, bp->n_pairs, bp->pairs, bp->scratch, bp->count);
-    sort_by(0, n, bp->n_pairs, bp->scratch, bp->pairs, bp->count);
+    sort_by(1, n, bp->n_pairs, bp->pairs, bp->scratch, bp->other.at);
+    sort_by(0, n, bp->n_pairs, bp->scratch, bp->pairs, bp->other.at);
     return CAROM_OK;
 }
 
-static carom_status sort_and_sweep(carom_broadphase *bp, int n, const carom_box *boxes)
+static carom_status find_pairs(carom_broadphase *bp, int n, const carom_box *boxes)
 {
-    carom_status e = reserve_ints(bp, &bp->order, &bp->order_max, n);
-    if (!e) e = reserve_ints(bp, &bp->merge, &bp->merge_max, n);
-    if (e) return e;
-    e = sweep(bp, sort_boxes(bp, n, boxes), boxes);
+    if (n <= ALL_PAIRS_MAX) return all_pairs(bp, n, boxes);
+    int done = 0;
+    carom_status e = crm_grid_pairs(bp, n, boxes, &done);
+    if (!e && !done) e = crm_sweep_pairs(bp, n, boxes);
     return e ? e : sort_pairs(bp, n);
 }
 
@@ -190,9 +142,10 @@ carom_status carom_broadphase_pairs(carom_broadphase *bp, int n, const carom_box
     if (!bp || n < 0 || n == INT_MAX || (n && !boxes) || !n_pairs || !pairs) {
         return CAROM_E_ARGUMENT;
     }
+    const carom_broadphase_stats none = {CAROM_ALL_PAIRS, 0, 0};
+    bp->stats = none;
     bp->n_pairs = 0;
-    const carom_status e =
-        n <= ALL_PAIRS_MAX ? all_pairs(bp, n, boxes) : sort_and_sweep(bp, n, boxes);
+    const carom_status e = find_pairs(bp, n, boxes);
     if (e) return e;
     *n_pairs = bp->n_pairs;
     *pairs = bp->pairs;

@@ -40,6 +40,22 @@ CAROM_API carom_status carom_broadphase_pairs(carom_broadphase *broadphase, int 
                                               const carom_box *boxes, int *n_pairs,
                                               const carom_pair **pairs);
 
+/* How the pairs of the last call were found: chosen by the number of boxes and the spread of their
+ * sizes; the pairs do not depend on it. */
+typedef enum carom_broadphase_method {
+    CAROM_ALL_PAIRS,     /* up to 64 boxes */
+    CAROM_GRID,          /* cells of about the boxes' size, and a list of the few larger ones */
+    CAROM_SORT_AND_SWEEP /* sizes too different for one grid */
+} carom_broadphase_method;
+
+typedef struct carom_broadphase_stats {
+    carom_broadphase_method method;
+    int n_large;  /* grid: boxes outside the grid */
+    long n_tests; /* pairs of boxes compared */
+} carom_broadphase_stats;
+
+CAROM_API carom_broadphase_stats carom_broadphase_statistics(const carom_broadphase *broadphase);
+
 /* Bytes held and number of allocations made so far. */
 CAROM_API void carom_broadphase_memory(const carom_broadphase *broadphase, size_t *bytes,
                                        long *calls);
