@@ -132,7 +132,10 @@ static carom_status find_pairs(carom_broadphase *bp, int n, const carom_box *box
     if (n <= ALL_PAIRS_MAX) return all_pairs(bp, n, boxes);
     int done = 0;
     carom_status e = crm_grid_pairs(bp, n, boxes, &done);
-    if (!e && !done) e = crm_sweep_pairs(bp, n, boxes);
+    if (!e && !done) {
+        bp->n_pairs = 0;
+        e = crm_sweep_pairs(bp, n, boxes);
+    }
     return e ? e : sort_pairs(bp, n);
 }
 

@@ -1,41 +1,37 @@
-/* grid.c: boxes in square cells, sorted by row and column.
+/* grid.c: boxes in rows and columns, sorted.
  *
- * The cell's side c is a power of two that all boxes but a few fit in.  A box belongs to the cell
- * of its lower corner, (floor(x / c), floor(y / c)), and reaches no farther than the next column
- * and row, which is checked on the numbers themselves.  Then boxes that overlap are in neighboring
- * cells: with the boxes sorted by row and column, each is compared with those after it up to the
- * next column, and with three columns of the next row.  The few others, large or far away, are
- * compared with all.  Nothing is stored per cell, so memory is linear in the boxes wherever they
- * are. */
+ * Rows have the height c of the largest box but a few, columns a width of c / 8.  A box belongs to
+ * the row and column of its lower corner; that it reaches no farther than the next row and 9
+ * columns on is checked on the numbers themselves.  All roundings are monotone, so boxes that
+ * overlap meet in these indices.  With the boxes sorted by row and column, each is compared with
+ * those after it in its row up to its last column, and with those of the next row from 9 columns
+ * before.  The few others, large or far away, are compared with all.  Nothing is stored per cell:
+ * memory is linear in the boxes wherever they are. */
 #include "broadphase/internal.h"
 
 #include <math.h>
 
-/* Boxes larger than a cell: 1 in 2048, and some.  More, and one grid does not fit. */
+/* Boxes that do not fit: 1 in 2048, and some.  More, and one grid is not for these boxes. */
 enum { LARGE_SHARE = 2048, LARGE_MIN = 16 };
 
-/* Comparisons per box above which the cells are too crowded. */
+/* Comparisons per box above which the rows are too crowded. */
 enum { CROWDED = 64 };
 
-/* Columns and rows are counted from a reference and must stay within this. */
-static const double INDEX_MAX = 1073741824.0; /* 2^30 */
+/* Columns per row height; columns that a box may span beyond its first. */
+enum { FINE = 8, SPAN_MAX = 9, SPAN_BITS = 4 };
 
-/* Binary exponents of doubles, frexp's: -1073 .. 1024. */
-enum { EXPONENT_MIN = -1073, N_EXPONENTS = 2098, N_SAMPLES = 15, DIGIT = 11 };
+/* Rows and columns are counted from a reference and must stay within this. */
+static const double INDEX_MAX = 268435456.0; /* 2^28 */
+
+enum { N_SAMPLES = 15, DIGIT = 11 };
 
 typedef struct grid {
-    double inverse; /* 1 / c */
-    double x0;      /* reference cell */
+    double x0; /* reference */
     double y0;
+    double per_column; /* 1 / width */
+    double per_row;
     int column_bits;
 } grid;
-
-static int exponent_of(double size)
-{
-    int e;
-    frexp(size, &e);
-    return size > 0 ? e : EXPONENT_MIN; /* size <= 2^e */
-}
 
 static double size_of(const carom_box *b)
 {
@@ -44,20 +40,39 @@ static double size_of(const carom_box *b)
     return w > h ? w : h;
 }
 
-/* The least exponent that all but `n_large` of the boxes fit in. */
-static int common_exponent(int n, const carom_box *boxes, int n_large)
+/* The biased exponent of a size >= 0: in the order of the sizes; infinity last. */
+static int octave(double size)
 {
-    int count[N_EXPONENTS] = {0};
+    uint64_t bits;
+    memcpy(&bits, &size, sizeof bits);
+    return (int)(bits >> 52 & 2047);
+}
+
+/* The least octave that all but n_large of the boxes are within. */
+static int common_octave(int n, const carom_box *boxes, int n_large)
+{
+    int count[2048] = {0};
     int m = 0;
     for (int i = 0; i < n; i++) {
-        const double size = size_of(&boxes[i]);
         if (crm_box_is_empty(&boxes[i])) continue;
+        count[octave(size_of(&boxes[i]))]++;
         m++;
-        count[size <= 1.7e308 ? exponent_of(size) - EXPONENT_MIN : N_EXPONENTS - 1]++;
     }
-    int e = N_EXPONENTS - 1;
-    for (int above = count[e]; e > 0 && above <= n_large && above < m; above += count[e]) e--;
-    return e + EXPONENT_MIN;
+    int top = 2047;
+    for (int above = count[top]; top > 0 && above <= n_large && above < m; above += count[top])
+        top--;
+    return top;
+}
+
+/* The largest size within the octave. */
+static double largest_within(int n, const carom_box *boxes, int top)
+{
+    double largest = 0;
+    for (int i = 0; i < n; i++) {
+        const double size = size_of(&boxes[i]);
+        if (size > largest && octave(size) <= top) largest = size;
+    }
+    return largest;
 }
 
 /* Median and spread (without the two extremes) of the lower sides of some boxes. */
@@ -66,7 +81,7 @@ static void sample(int n, const carom_box *boxes, int along_y, double *median, d
     double x[N_SAMPLES];
     int m = 0;
     for (int k = 0; k < N_SAMPLES; k++) {
-        const carom_box *b = &boxes[(int)((long)n * k / N_SAMPLES)];
+        const carom_box *b = &boxes[(int)((int64_t)n * k / N_SAMPLES)];
         const double v = along_y ? b->lower.y : b->lower.x;
         if (crm_box_is_empty(b)) continue;
         int i = m++;
@@ -78,37 +93,47 @@ static void sample(int n, const carom_box *boxes, int along_y, double *median, d
 }
 
 /* 0: no useful grid. */
-static int choose_cells(int n, const carom_box *boxes, grid *g)
+static int choose_rows(int n, const carom_box *boxes, grid *g)
 {
-    double x;
-    double y;
     double spread_x;
     double spread_y;
-    sample(n, boxes, 0, &x, &spread_x);
-    sample(n, boxes, 1, &y, &spread_y);
+    sample(n, boxes, 0, &g->x0, &spread_x);
+    sample(n, boxes, 1, &g->y0, &spread_y);
     const double spread = spread_x > spread_y ? spread_x : spread_y;
-    int e = common_exponent(n, boxes, n / LARGE_SHARE + LARGE_MIN);
-    /* Points need cells too: not so small that their number overflows. */
-    if (!(spread < 1e300)) return 0;
-    if (e < exponent_of(spread) - 28) e = exponent_of(spread) - 28;
-    if (e < -1000 || e > 1000) return 0;
-    g->inverse = ldexp(1.0, -e);
-    g->x0 = floor(x * g->inverse);
-    g->y0 = floor(y * g->inverse);
-    return fabs(g->x0) < HUGE_VAL && fabs(g->y0) < HUGE_VAL;
+    const int top = common_octave(n, boxes, n / LARGE_SHARE + LARGE_MIN);
+    double c = largest_within(n, boxes, top) * (1 + 1e-6);
+    /* Points need rows too: not so low that their number overflows. */
+    if (c < spread / (INDEX_MAX / 64)) c = spread / (INDEX_MAX / 64);
+    g->per_row = 1 / c;
+    g->per_column = FINE / c;
+    return g->per_row > 1e-300 && g->per_column < 1e300 && fabs(g->x0) < HUGE_VAL &&
+           fabs(g->y0) < HUGE_VAL;
 }
 
-/* Cell of a box that fits the grid; 0: it does not. */
-static int cell_of(const grid *g, const carom_box *b, int *column, int *row)
+static int floor_of(double v)
 {
-    const double x = floor(b->lower.x * g->inverse);
-    const double y = floor(b->lower.y * g->inverse);
-    if (!(fabs(x - g->x0) < INDEX_MAX && fabs(y - g->y0) < INDEX_MAX)) return 0;
-    if (!(floor(b->upper.x * g->inverse) <= x + 1)) return 0;
-    if (!(floor(b->upper.y * g->inverse) <= y + 1)) return 0;
-    *column = (int)(x - g->x0);
-    *row = (int)(y - g->y0);
-    return 1;
+    const int k = (int)v;
+    return k - (v < k);
+}
+
+typedef struct place {
+    int column;
+    int row;
+    int span; /* columns beyond the first */
+} place;
+
+/* 0: the box does not fit the grid. */
+static int place_of(const grid *g, const carom_box *b, place *p)
+{
+    const double x = (b->lower.x - g->x0) * g->per_column;
+    const double y = (b->lower.y - g->y0) * g->per_row;
+    const double x1 = (b->upper.x - g->x0) * g->per_column;
+    const double y1 = (b->upper.y - g->y0) * g->per_row;
+    if (!(x > -INDEX_MAX && x1 < INDEX_MAX && y > -INDEX_MAX && y1 < INDEX_MAX)) return 0;
+    p->column = floor_of(x);
+    p->row = floor_of(y);
+    p->span = floor_of(x1) - p->column;
+    return p->span <= SPAN_MAX && floor_of(y1) <= p->row + 1;
 }
 
 typedef struct range {
@@ -122,50 +147,52 @@ static void extend(range *r, int i)
     if (i > r->high) r->high = i;
 }
 
-/* Boxes of the grid go to order, the others to large; returns the number of the former, -1 when
- * there are too many others.  Columns and rows are kept in the keys, 32 bits each. */
-static int assign_cells(carom_broadphase *bp, grid *g, int n, const carom_box *boxes,
-                        range *columns, range *rows)
-{
-    const int large_max = n / LARGE_SHARE + LARGE_MIN + N_SAMPLES;
-    int m = 0;
-    int n_large = 0;
-    for (int i = 0; i < n; i++) {
-        int column;
-        int row;
-        if (crm_box_is_empty(&boxes[i])) continue;
-        if (!cell_of(g, &boxes[i], &column, &row)) {
-            if (n_large == large_max) return -1;
-            bp->large.at[n_large++] = i;
-            continue;
-        }
-        extend(columns, column);
-        extend(rows, row);
-        bp->order.at[m] = i;
-        bp->key.at[m++] = (uint64_t)(uint32_t)row << 32 | (uint32_t)column;
-    }
-    bp->stats.n_large = n_large;
-    return m;
-}
-
-static int bits_of(uint64_t x)
+static int bits_of(int x)
 {
     int bits = 0;
     for (; x; x >>= 1) bits++;
     return bits;
 }
 
-/* row << column_bits | column, both from 1 on, so that neither neighbor carries over. */
-static int make_keys(carom_broadphase *bp, grid *g, int m, range columns, range rows)
+/* Boxes of the grid go to order, the others to large; returns the number of the former, -1 when
+ * there are too many others. */
+static int split(carom_broadphase *bp, const grid *g, int n, const carom_box *boxes, range *columns,
+                 range *rows)
 {
-    g->column_bits = bits_of((uint64_t)((int64_t)columns.high - columns.low) + 2);
-    for (int i = 0; i < m; i++) {
-        const uint64_t k = bp->key.at[i];
-        const int64_t column = (int64_t)(int32_t)(uint32_t)k - columns.low + 1;
-        const int64_t row = (int64_t)(int32_t)(uint32_t)(k >> 32) - rows.low + 1;
-        bp->key.at[i] = (uint64_t)row << g->column_bits | (uint64_t)column;
+    const int large_max = n / LARGE_SHARE + LARGE_MIN + N_SAMPLES;
+    int m = 0;
+    int n_large = 0;
+    for (int i = 0; i < n; i++) {
+        place p;
+        if (crm_box_is_empty(&boxes[i])) continue;
+        if (place_of(g, &boxes[i], &p)) {
+            extend(columns, p.column);
+            extend(rows, p.row);
+            bp->order.at[m++] = i;
+        } else if (n_large < large_max) {
+            bp->large.at[n_large++] = i;
+        } else {
+            return -1;
+        }
     }
-    return g->column_bits + bits_of((uint64_t)((int64_t)rows.high - rows.low) + 1);
+    bp->stats.n_large = n_large;
+    return m;
+}
+
+/* Keys: row, column, span from high to low; columns leave room on both sides, so that no neighbor
+ * is in another row.  Returns the number of bits. */
+static int make_keys(carom_broadphase *bp, grid *g, int m, const carom_box *boxes, range columns,
+                     range rows)
+{
+    g->column_bits = bits_of(columns.high - columns.low + 2 * SPAN_MAX);
+    for (int i = 0; i < m; i++) {
+        place p;
+        place_of(g, &boxes[bp->order.at[i]], &p);
+        const uint64_t column = (uint64_t)(p.column - columns.low + SPAN_MAX);
+        const uint64_t row = (uint64_t)(p.row - rows.low);
+        bp->key.at[i] = (row << g->column_bits | column) << SPAN_BITS | (uint64_t)p.span;
+    }
+    return bits_of(rows.high - rows.low) + g->column_bits + SPAN_BITS;
 }
 
 static void swap_keys(carom_broadphase *bp)
@@ -178,10 +205,10 @@ static void swap_keys(carom_broadphase *bp)
     bp->other = order;
 }
 
-/* Radix sort by the lowest `bits`, stable: boxes of one cell stay in the order of their indices. */
-static void sort_cells(carom_broadphase *bp, int m, int bits)
+/* Radix sort of the bits above the span, stable. */
+static void sort_keys(carom_broadphase *bp, int m, int bits)
 {
-    for (int shift = 0; shift < bits; shift += DIGIT) {
+    for (int shift = SPAN_BITS; shift < bits; shift += DIGIT) {
         int count[(1 << DIGIT) + 1] = {0};
         for (int i = 0; i < m; i++) {
             count[(bp->key.at[i] >> shift & ((1 << DIGIT) - 1)) + 1]++;
@@ -197,46 +224,35 @@ static void sort_cells(carom_broadphase *bp, int m, int bits)
     }
 }
 
-/* Number of comparisons that scan_cells will make; stops counting past the limit. */
-static long count_tests(const carom_broadphase *bp, const grid *g, int m, long limit)
-{
-    const uint64_t *key = bp->key.at;
-    const uint64_t row = (uint64_t)1 << g->column_bits;
-    long tests = 0;
-    int same = 0;
-    int first = 0;
-    int last = 0;
-    for (int i = 0; i < m && tests <= limit; i++) {
-        while (same < m && key[same] <= key[i] + 1) same++;
-        while (first < m && key[first] < key[i] + row - 1) first++;
-        while (last < m && key[last] <= key[i] + row + 1) last++;
-        tests += same - i - 1 + last - first;
-    }
-    return tests;
-}
-
+/* Box i against those from index `from` up to the place `last`. */
 static carom_status test_run(carom_broadphase *bp, int i, int from, uint64_t last, int m)
 {
     const carom_box a = bp->sorted.at[i];
-    for (int j = from; j < m && bp->key.at[j] <= last; j++) {
+    int j = from;
+    for (; j < m && bp->key.at[j] >> SPAN_BITS <= last; j++) {
         if (!crm_box_overlaps(&a, &bp->sorted.at[j])) continue;
         const carom_status e = crm_pair_add(bp, bp->order.at[i], bp->order.at[j]);
         if (e) return e;
     }
+    bp->stats.n_tests += j - from;
     return CAROM_OK;
 }
 
-static carom_status scan_cells(carom_broadphase *bp, const grid *g, int m)
+/* *done = 0: too crowded. */
+static carom_status scan_rows(carom_broadphase *bp, const grid *g, int n, int m, int *done)
 {
-    const uint64_t *key = bp->key.at;
     const uint64_t row = (uint64_t)1 << g->column_bits;
+    const long limit = (long)CROWDED * n;
     int first = 0;
-    for (int i = 0; i < m; i++) {
-        carom_status e = test_run(bp, i, i + 1, key[i] + 1, m);
-        while (first < m && key[first] < key[i] + row - 1) first++;
-        if (!e) e = test_run(bp, i, first, key[i] + row + 1, m);
+    for (int i = 0; i < m && bp->stats.n_tests <= limit; i++) {
+        const uint64_t at = bp->key.at[i] >> SPAN_BITS;
+        const uint64_t last = at + (bp->key.at[i] & ((1 << SPAN_BITS) - 1));
+        carom_status e = test_run(bp, i, i + 1, last, m);
+        while (first < m && bp->key.at[first] >> SPAN_BITS < at + row - SPAN_MAX) first++;
+        if (!e) e = test_run(bp, i, first, last + row, m);
         if (e) return e;
     }
+    *done = bp->stats.n_tests <= limit;
     return CAROM_OK;
 }
 
@@ -279,19 +295,18 @@ carom_status crm_grid_pairs(carom_broadphase *bp, int n, const carom_box *boxes,
     range columns = {INT32_MAX, INT32_MIN};
     range rows = {INT32_MAX, INT32_MIN};
     *done = 0;
-    if (!choose_cells(n, boxes, &g)) return CAROM_OK;
+    if (!choose_rows(n, boxes, &g)) return CAROM_OK;
     carom_status e = reserve(bp, n);
     if (e) return e;
-    const int m = assign_cells(bp, &g, n, boxes, &columns, &rows);
+    const int m = split(bp, &g, n, boxes, &columns, &rows);
     if (m < 0) return CAROM_OK;
-    if (m) sort_cells(bp, m, make_keys(bp, &g, m, columns, rows));
-    const long limit = (long)CROWDED * n;
-    const long tests = m ? count_tests(bp, &g, m, limit) : 0;
-    if (tests > limit) return CAROM_OK;
-    for (int i = 0; i < m; i++) bp->sorted.at[i] = boxes[bp->order.at[i]];
-    *done = 1;
     bp->stats.method = CAROM_GRID;
-    bp->stats.n_tests = tests;
-    e = m ? scan_cells(bp, &g, m) : CAROM_OK;
-    return e ? e : scan_large(bp, m, boxes);
+    *done = 1;
+    if (m) {
+        sort_keys(bp, m, make_keys(bp, &g, m, boxes, columns, rows));
+        for (int i = 0; i < m; i++) bp->sorted.at[i] = boxes[bp->order.at[i]];
+        e = scan_rows(bp, &g, n, m, done);
+    }
+    if (!e && *done) e = scan_large(bp, m, boxes);
+    return e;
 }

@@ -78,6 +78,7 @@ carom_status crm_sweep_pairs(carom_broadphase *bp, int n, const carom_box *boxes
     if (e) return e;
     bp->stats.method = CAROM_SORT_AND_SWEEP;
     bp->stats.n_large = 0;
+    bp->stats.n_tests = 0;
     const int along_y = pick_axis(n, boxes);
     const int m = sort_boxes(bp, n, boxes, along_y);
     carom_box *sorted = bp->sorted.at;
