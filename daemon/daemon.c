@@ -1,10 +1,10 @@
 #include "daemon.h"
 
-#include "bridge.h"
 #include "carom/base.h"
-#include "hub.h"
 #include "service.h"
-#include "udpm.h"
+#include "transport/bridge.h"
+#include "transport/hub.h"
+#include "transport/udpm.h"
 
 #include <inttypes.h>
 #include <stdio.h>

@@ -2,7 +2,7 @@
 #ifndef CRM_DAEMON_H
 #define CRM_DAEMON_H
 
-#include "server.h"
+#include "session/server.h"
 
 enum { CRM_DAEMON_TEXT = 512 };
 

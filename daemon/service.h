@@ -2,7 +2,7 @@
 #ifndef CRM_SERVICE_H
 #define CRM_SERVICE_H
 
-#include "server.h"
+#include "session/server.h"
 
 typedef struct crm_service crm_service;
 

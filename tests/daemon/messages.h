@@ -11,7 +11,7 @@
 #include "carom_state_t.h"
 #include "carom_status_t.h"
 #include "carom_step_request_t.h"
-#include "server.h"
+#include "session/server.h"
 
 /* Encoded bytes; free with free. */
 typedef struct bytes {

@@ -1,8 +1,8 @@
 /* test_hub.c: the hub against LCM's own client, and against what no client should send. */
 #include "near.h"
 
-#include "hub.h"
 #include "socket_peer.h"
+#include "transport/hub.h"
 
 #include <lcm/lcm.h>
 #include <poll.h>

@@ -324,6 +324,33 @@ static void sessions_take_turns(void **state)
     bench_destroy(b);
 }
 
+/* A thousand sessions of one client, each with its own steps. */
+static void a_thousand_sessions(void **state)
+{
+    (void)state;
+    bench *b = bench_create(NULL);
+    for (int s = 1; s <= 1000; s++) {
+        const carom_scene_t m = scene_of(CLIENT, s, 1);
+        bench_do(b, pack_scene(&m));
+    }
+    assert_int_equal(crm_server_n_sessions(b->server), 1000);
+    for (int s = 1; s <= 1000; s++) {
+        const carom_step_request_t m = steps_of(CLIENT, s, 2, 0, 1 + s % 3, 0);
+        bench_receive(b, pack_step(&m));
+    }
+    bench_clear(b);
+    while (bench_slice(b)) {
+    }
+    assert_int_equal(bench_count(b, CRM_WIRE_STATE), 1000);
+    for (int k = 0; k < 1000; k++) {
+        carom_state_t *m = bench_state(b, k);
+        assert_int_equal(m->session, k + 1); /* in the order of asking */
+        assert_int_equal(m->step, 1 + m->session % 3);
+        carom_state_t_destroy(m);
+    }
+    bench_destroy(b);
+}
+
 /* --- gradients */
 
 static void gradient_is_that_of_the_library(void **state)
@@ -916,6 +943,7 @@ int main(void)
         cmocka_unit_test(gaps_mismatches_and_strangers),
         cmocka_unit_test(pending_busy_and_forgotten),
         cmocka_unit_test(sessions_take_turns),
+        cmocka_unit_test(a_thousand_sessions),
         cmocka_unit_test(gradient_is_that_of_the_library),
         cmocka_unit_test(tapes_follow_the_requests),
         cmocka_unit_test(descent_changes_the_scene),

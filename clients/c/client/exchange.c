@@ -236,7 +236,7 @@ static carom_client_code judge(carom_client *c, const crm_exchange *x)
 /* Codes after which the seq is used up. */
 static int executed(const crm_exchange *x)
 {
-    const int code = x->reply.reply_code;
+    const int8_t code = x->reply.reply_code;
     return x->has_reply && (code == CAROM_REPLY_T_OK || code == CAROM_REPLY_T_MISMATCH ||
                             code == CAROM_REPLY_T_REFUSED || code == CAROM_REPLY_T_FAILED);
 }

@@ -1,5 +1,5 @@
 /* server.c: the table of sessions, and what is answered without computation. */
-#include "server_parts.h"
+#include "parts.h"
 
 #include <inttypes.h>
 #include <math.h>

@@ -1,6 +1,6 @@
-/* server_parts.h: what server.c, session.c, answer.c and assembly.c share. */
-#ifndef CRM_SERVER_PARTS_H
-#define CRM_SERVER_PARTS_H
+/* parts.h: what server.c, session.c, answer.c and assembly.c share. */
+#ifndef CRM_SESSION_PARTS_H
+#define CRM_SESSION_PARTS_H
 
 #include "budget.h"
 #include "carom_reply_t.h"

@@ -25,6 +25,12 @@ static void put_u32(unsigned char *b, uint32_t x)
     for (int i = 0; i < 4; i++) b[i] = (unsigned char)(x >> (24 - 8 * i));
 }
 
+static unsigned char *put_bytes(unsigned char *to, const void *from, size_t n)
+{
+    if (n) memcpy(to, from, n);
+    return to + n;
+}
+
 /* --- packets */
 
 crm_packet *crm_packet_create(const char *channel, const void *bytes, size_t size, int is_state)
@@ -37,9 +43,9 @@ crm_packet *crm_packet_create(const char *channel, const void *bytes, size_t siz
     p->size = total;
     put_u32(p->bytes, CRM_FRAME_PUBLISH);
     put_u32(p->bytes + 4, (uint32_t)n);
-    memcpy(p->bytes + 8, channel, n);
-    put_u32(p->bytes + 8 + n, (uint32_t)size);
-    if (size) memcpy(p->bytes + 12 + n, bytes, size);
+    unsigned char *after = put_bytes(p->bytes + 8, channel, n);
+    put_u32(after, (uint32_t)size);
+    put_bytes(after + 4, bytes, size);
     return p;
 }
 

@@ -1,5 +1,5 @@
 /* session.c: requests and their execution, one time slice after the other. */
-#include "server_parts.h"
+#include "parts.h"
 
 #include <inttypes.h>
 #include <math.h>

@@ -1,5 +1,5 @@
 /* assembly.c: scenes in pieces. */
-#include "server_parts.h"
+#include "parts.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,18 +50,17 @@ static int check_piece(const carom_scene_chunk_t *c, int max_size, char *text)
 static int start(crm_assembly *a, crm_budget *budget, const carom_scene_chunk_t *c)
 {
     crm_assembly_clear(a, budget);
-    crm_assembly b = {c->seq, c->scene_bytes, c->chunk_stride, 0, 0, NULL, NULL};
-    b.n_chunks = (b.size - 1) / b.stride + 1;
-    b.n_missing = b.n_chunks;
-    if (!crm_budget_take(budget, held(&b))) return 0;
-    b.bytes = malloc((size_t)b.size);
-    b.has = calloc((size_t)b.n_chunks, 1);
-    if (!b.bytes || !b.has) {
-        crm_assembly_clear(&b, budget);
-        return 0;
-    }
-    *a = b;
-    return 1;
+    a->size = c->scene_bytes;
+    a->stride = c->chunk_stride;
+    a->n_chunks = (a->size - 1) / a->stride + 1;
+    a->n_missing = a->n_chunks;
+    if (!crm_budget_take(budget, held(a))) return 0;
+    a->seq = c->seq;
+    a->bytes = malloc((size_t)a->size);
+    a->has = calloc((size_t)a->n_chunks, 1);
+    if (a->bytes && a->has) return 1;
+    crm_assembly_clear(a, budget);
+    return 0;
 }
 
 int crm_assembly_add(crm_assembly *a, crm_budget *budget, const carom_scene_chunk_t *c,

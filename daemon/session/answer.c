@@ -1,5 +1,5 @@
 /* answer.c: encoding, and answers that are kept. */
-#include "server_parts.h"
+#include "parts.h"
 
 #include <stdlib.h>
 
