@@ -53,31 +53,13 @@ int crm_still_beyond(const carom_frame *a, const carom_frame *b, double reach,
     return *gap > reach;
 }
 
-/* Neighbor l of vertex j of q is clearly farther along d than j, by more than |d| times rounding.
- */
-static int rises(const crm_placed *q, int j, int l, carom_vec2 d, double length)
-{
-    const carom_vec2 e = crm_turn(q, crm_sub(q->v[l], q->v[j]));
-    return crm_dot(d, e) > crm_noise(q, j, q, l) * length;
-}
-
-/* Vertex j of q is clearly the lowest along d: any search finds that one. */
-static int is_lowest(const crm_placed *q, int j, carom_vec2 d, double length)
-{
-    if (q->n == 1) return 1;
-    return rises(q, j, crm_next(q, j), d, length) && rises(q, j, crm_prev(q, j), d, length);
-}
-
-/* Edge k of p under vertex j of q, apart: as it was?  Overlapping: proven, but for the vertex. */
+/* Edge k of p under vertex j of q.  Overlapping: the face is proven, the vertex is not. */
 static int recall_face(const crm_placed *p, int k, const crm_placed *q, int j, int on_b,
                        int overlap, crm_closest *out)
 {
     crm_face_at(p, k, q, j, on_b, out);
-    if (!is_lowest(q, j, out->ref.m, 1.0)) return 0;
-    const double tol = crm_noise(p, k, q, j);
-    if (overlap) return out->gap < -tol;
-    const double along = crm_dot(out->ref.t, crm_between(p, k, q, j));
-    return out->gap > tol && along > tol && along < out->ref.length - tol;
+    if (!overlap) return crm_face_is_closest(p, k, q, j, out);
+    return out->gap < -crm_noise(p, k, q, j) && crm_is_lowest(q, j, out->ref.m, 1.0);
 }
 
 static int recall_vertices(const crm_placed *a, int i, const crm_placed *b, int j, crm_closest *out)
@@ -89,8 +71,8 @@ static int recall_vertices(const crm_placed *a, int i, const crm_placed *b, int 
     out->tied = 0;
     out->lead = 0;
     out->gap = crm_length(w);
-    return out->gap > crm_noise(a, i, b, j) && is_lowest(b, j, w, out->gap) &&
-           is_lowest(a, i, crm_neg(w), out->gap);
+    return out->gap > crm_noise(a, i, b, j) && crm_is_lowest(b, j, w, out->gap) &&
+           crm_is_lowest(a, i, crm_neg(w), out->gap);
 }
 
 /* 1: the cache has the answer. */

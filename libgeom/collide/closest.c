@@ -2,40 +2,6 @@
  * certified axis ends there, and whatever is too close for a certificate is left to the sweep. */
 #include "collide/closest.h"
 
-/* Distances below this are rounding [1], times the coordinates they come from [m]. */
-static const double NEAR_TOL = 1e-13;
-
-/* Heights of faces that differ by less are tied [1], times the coordinates [m]. */
-static const double TIE_TOL = 1e-14;
-
-static double norm1(carom_vec2 a)
-{
-    return fabs(a.x) + fabs(a.y);
-}
-
-double crm_noise(const crm_placed *a, int i, const crm_placed *b, int j)
-{
-    return NEAR_TOL * (norm1(a->v[i]) + norm1(b->v[j]));
-}
-
-static double coordinates(const crm_placed *p)
-{
-    const double x = 0.5 * (norm1(p->v[0]) + norm1(p->v[p->n / 2]));
-    return x > p->radius ? x : p->radius;
-}
-
-double crm_coordinates(const crm_placed *a, const crm_placed *b)
-{
-    const double x = coordinates(a);
-    const double y = coordinates(b);
-    return x > y ? x : y;
-}
-
-double crm_tie(const crm_placed *a, const crm_placed *b)
-{
-    return TIE_TOL * crm_coordinates(a, b);
-}
-
 void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b,
                  crm_closest *out)
 {
@@ -46,6 +12,28 @@ void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int 
     out->lead = 0;
     out->ref = crm_reference_at(p, edge);
     out->gap = crm_dot(out->ref.m, crm_between(p, edge, q, j));
+}
+
+/* From vertex j of q to its neighbor l, up along d by more than |d| times rounding. */
+static int rises(const crm_placed *q, int j, int l, carom_vec2 d, double length)
+{
+    const carom_vec2 e = crm_turn(q, crm_sub(q->v[l], q->v[j]));
+    return crm_dot(d, e) > crm_noise(q, j, q, l) * length;
+}
+
+int crm_is_lowest(const crm_placed *q, int j, carom_vec2 d, double length)
+{
+    if (q->n == 1) return 1;
+    return rises(q, j, crm_next(q, j), d, length) && rises(q, j, crm_prev(q, j), d, length);
+}
+
+int crm_face_is_closest(const crm_placed *p, int edge, const crm_placed *q, int j,
+                        const crm_closest *c)
+{
+    const double tol = crm_noise(p, edge, q, j);
+    const double along = crm_dot(c->ref.t, crm_between(p, edge, q, j));
+    return c->gap > tol && along > tol && along < c->ref.length - tol &&
+           crm_is_lowest(q, j, c->ref.m, 1.0);
 }
 
 static crm_axis axis_along(const crm_placed *a, const crm_placed *b, carom_vec2 d)
@@ -127,12 +115,6 @@ static int foot_on_face(const crm_placed *p, int k, const crm_placed *q, int j, 
 static void walk_lengthwise(const crm_placed *a, const crm_placed *b, double reach,
                             crm_closest *face)
 {
-    const int on_a = face->kind == CRM_FACE_A;
-    const crm_placed *p = on_a ? a : b;
-    const crm_placed *q = on_a ? b : a;
-    const int k = on_a ? face->a : face->b;
-    const int j = on_a ? face->b : face->a;
-    if (foot_on_face(p, k, q, j, crm_noise(p, k, q, j))) return;
     const carom_vec2 e = face->ref.e;
     if (crm_closest_from(a, b, axis_along(a, b, e), reach, face)) return;
     crm_closest_from(a, b, axis_along(a, b, crm_neg(e)), reach, face);
@@ -141,13 +123,22 @@ static void walk_lengthwise(const crm_placed *a, const crm_placed *b, double rea
 /* From the face of largest separation to the closest features, if it separates. */
 static void leave_face(const crm_placed *a, const crm_placed *b, double reach, crm_closest *face)
 {
-    const double tol = crm_noise(a, face->a, b, face->b);
+    const int on_a = face->kind == CRM_FACE_A;
+    const crm_placed *p = on_a ? a : b;
+    const crm_placed *q = on_a ? b : a;
+    const int k = on_a ? face->a : face->b;
+    const int j = on_a ? face->b : face->a;
+    const double tol = crm_noise(p, k, q, j);
     if (face->gap > tol) {
+        if (crm_face_is_closest(p, k, q, j, face)) {
+            face->tied = 0; /* another face as high is not as close */
+            return;
+        }
         const carom_vec2 m = face->ref.m;
-        const crm_axis x = {face->kind == CRM_FACE_A ? m : crm_neg(m), face->a, face->b};
+        const crm_axis x = {on_a ? m : crm_neg(m), face->a, face->b};
         const crm_closest known = *face;
         walk_from(a, b, x, face->gap, 1.0, &known, face);
-    } else if (face->gap >= -tol) {
+    } else if (face->gap >= -tol && !foot_on_face(p, k, q, j, tol)) {
         walk_lengthwise(a, b, reach, face);
     }
 }

@@ -22,12 +22,54 @@ typedef struct crm_closest {
     crm_reference ref; /* faces: the edge */
 } crm_closest;
 
+/* Distances below this are rounding [1], times the coordinates they come from [m]. */
+#define CRM_NEAR_TOL 1e-13
+
+/* Heights of faces that differ by less are tied [1], times the coordinates [m]. */
+#define CRM_TIE_TOL 1e-14
+
 /* What rounding may add to a distance between these vertices. */
-double crm_noise(const crm_placed *a, int i, const crm_placed *b, int j);
+static inline double crm_noise(const crm_placed *p, int i, const crm_placed *q, int j)
+{
+    const carom_vec2 a = p->v[i];
+    const carom_vec2 b = q->v[j];
+    return CRM_NEAR_TOL * (fabs(a.x) + fabs(a.y) + fabs(b.x) + fabs(b.y));
+}
+
+/* The size of a core's coordinates, by two vertices far from each other [m]. */
+static inline double crm_core_coordinates(const crm_placed *p)
+{
+    const carom_vec2 a = p->v[0];
+    const carom_vec2 b = p->v[p->n / 2];
+    const double x = 0.5 * (fabs(a.x) + fabs(a.y) + fabs(b.x) + fabs(b.y));
+    return x > p->radius ? x : p->radius;
+}
+
+static inline double crm_coordinates(const crm_placed *a, const crm_placed *b)
+{
+    const double x = crm_core_coordinates(a);
+    const double y = crm_core_coordinates(b);
+    return x > y ? x : y;
+}
+
+/* Faces whose heights differ by less are tied [m]. */
+static inline double crm_tie(const crm_placed *a, const crm_placed *b)
+{
+    return CRM_TIE_TOL * crm_coordinates(a, b);
+}
 
 /* Edge `edge` of p, vertex j of q; on_b: p is B.  Not tied, no lead. */
 void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b,
                  crm_closest *out);
+
+/* Vertex j of q is lower along d (of the given length) than its neighbors by more than rounding:
+ * any search finds that one. */
+int crm_is_lowest(const crm_placed *q, int j, carom_vec2 d, double length);
+
+/* Apart, at a face: its vertex is clearly the lowest and its foot clearly inside the edge.  Any
+ * walk ends there. */
+int crm_face_is_closest(const crm_placed *p, int edge, const crm_placed *q, int j,
+                        const crm_closest *c);
 
 /* The parts, in closest.c, walk.c, sweep.c and gjk.c. --------------------------------------- */
 
@@ -53,11 +95,6 @@ void crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, doub
 /* The same where neither core has more than CRM_FEW vertices. */
 enum { CRM_FEW = 8 };
 void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_closest *out);
-
-/* The size of the coordinates that heights come from [m], and the part of it below which faces are
- * tied. */
-double crm_coordinates(const crm_placed *a, const crm_placed *b);
-double crm_tie(const crm_placed *a, const crm_placed *b);
 
 /* libccd's GJK.  1: it says disjoint and *axis is its last direction with our support vertices, yet
  * to be certified by the caller. */

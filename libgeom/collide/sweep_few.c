@@ -132,8 +132,10 @@ void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_c
         apart_by(sqrt(key[top_a]), out);
         return;
     }
-    int top = n_a + keys_of(&fb, &fa, key + n_a);
-    if (n == n_a || (n_a && key[top_a] >= key[top])) top = top_a;
+    const int top_b = n_a + keys_of(&fb, &fa, key + n_a);
+    const double high_a = n_a ? key[top_a] : -HUGE_VAL;
+    const double high_b = n > n_a ? key[top_b] : -HUGE_VAL;
+    const int top = high_a >= high_b ? top_a : top_b;
     if (key[top] > far) {
         apart_by(sqrt(key[top]), out);
         return;
