@@ -168,6 +168,7 @@ static const field gradient_fields[] = {
     F_DOUBLES("radius", 9),
     F_DOUBLES("vertices", 10),
     F_DOUBLES("anchors", 11),
+    F_DOUBLES("dt", 12),
     F_END,
 };
 

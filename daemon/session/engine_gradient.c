@@ -24,6 +24,12 @@ static size_t one_per_body(const crm_engine *e)
     return (size_t)e->scene->num_bodies;
 }
 
+static size_t one(const crm_engine *e)
+{
+    (void)e;
+    return 1;
+}
+
 static size_t two(const crm_engine *e)
 {
     (void)e;
@@ -70,6 +76,7 @@ static const parameter parameters[] = {
     PARAMETER(radius, RADIUS, one_per_shape),
     PARAMETER(vertices, VERTICES, two_per_vertex),
     PARAMETER(anchors, ANCHORS, four_per_joint),
+    PARAMETER(dt, DT, one),
 };
 
 enum { N_PARAMETERS = sizeof parameters / sizeof parameters[0] };
@@ -84,6 +91,19 @@ static int32_t *count_of(carom_parameter_gradient_t *m, const parameter *p)
     return (int32_t *)(void *)((char *)m + p->message_count);
 }
 
+static int unknown_bits(int32_t wanted)
+{
+    int32_t known = 0;
+    for (int i = 0; i < N_PARAMETERS; i++) known |= parameters[i].bit;
+    return wanted & ~known;
+}
+
+static carom_status unknown_wanted(int32_t wanted, char *text)
+{
+    return crm_engine_fault(CAROM_E_ARGUMENT, text, "wanted = %d: the bits %d name no parameter",
+                            wanted, unknown_bits(wanted));
+}
+
 static carom_status check_loss(const crm_engine *e, const carom_loss_gradient_t *loss, char *text)
 {
     const int64_t n = (int64_t)three_per_body(e) * loss->num_bars;
@@ -91,6 +111,7 @@ static carom_status check_loss(const crm_engine *e, const carom_loss_gradient_t 
         return crm_engine_fault(CAROM_E_STATE, text,
                                 "nothing is recorded: step with record = RECORD_ON first");
     }
+    if (unknown_bits(loss->wanted)) return unknown_wanted(loss->wanted, text);
     if (loss->num_bar_coords != n) {
         return crm_engine_fault(CAROM_E_ARGUMENT, text,
                                 "num_bar_coords = %d: %d states of %d bodies need %" PRId64,
@@ -159,6 +180,7 @@ static carom_gradient gradient_view(const carom_parameter_gradient_t *m)
     g.radius = wanted(m->radius, w & CAROM_PARAMETER_GRADIENT_T_RADIUS);
     g.vertices = (carom_vec2 *)(void *)wanted(m->vertices, w & CAROM_PARAMETER_GRADIENT_T_VERTICES);
     g.anchors = (carom_vec2 *)(void *)wanted(m->anchors, w & CAROM_PARAMETER_GRADIENT_T_ANCHORS);
+    g.dt = wanted(m->dt, w & CAROM_PARAMETER_GRADIENT_T_DT);
     return g;
 }
 
@@ -208,10 +230,11 @@ static carom_status check_descent(const crm_engine *e, const carom_parameter_gra
     if (!(d->rate > 0 && d->rate < HUGE_VAL)) {
         return crm_engine_fault(CAROM_E_ARGUMENT, text, "rate = %g: must be > 0", d->rate);
     }
-    if (d->wanted & CAROM_PARAMETER_GRADIENT_T_FORCE_STEPS) {
+    if (d->wanted & (CAROM_PARAMETER_GRADIENT_T_FORCE_STEPS | CAROM_PARAMETER_GRADIENT_T_DT)) {
         return crm_engine_fault(CAROM_E_ARGUMENT, text,
-                                "force_steps belong to the step requests, not to the scene");
+                                "force_steps belong to the step requests, dt to the settings");
     }
+    if (unknown_bits(d->wanted)) return unknown_wanted(d->wanted, text);
     carom_parameter_gradient_t view = *d;
     for (int i = 0; i < N_PARAMETERS; i++) {
         const parameter *p = &parameters[i];

@@ -360,7 +360,8 @@ static void gradient_is_that_of_the_library(void **state)
     bench *b = with_scene();
     const int wanted = CAROM_PARAMETER_GRADIENT_T_Q0 | CAROM_PARAMETER_GRADIENT_T_MASS |
                        CAROM_PARAMETER_GRADIENT_T_FRICTION |
-                       CAROM_PARAMETER_GRADIENT_T_FORCE_STEPS | CAROM_PARAMETER_GRADIENT_T_ANCHORS;
+                       CAROM_PARAMETER_GRADIENT_T_FORCE_STEPS | CAROM_PARAMETER_GRADIENT_T_ANCHORS |
+                       CAROM_PARAMETER_GRADIENT_T_DT;
     do_recorded(b, 2, 0, STEPS);
     assert_int_equal(bench_reply(b).recorded_steps, STEPS);
     const carom_loss_gradient_t loss = loss_of(CLIENT, SESSION, 3, STEPS, COORD, wanted);
@@ -375,6 +376,7 @@ static void gradient_is_that_of_the_library(void **state)
     for (int k = 0; k < STEPS; k++) assert_true(carom_tape_step(tape, NULL, NULL) >= 0);
     double q_bar[3 * N] = {0}, q0[3 * N], mass[N], friction[N], steps[3 * N * STEPS];
     carom_vec2 anchors[2];
+    double dt = 0;
     q_bar[COORD] = 1;
     const carom_state_bar bar = {STEPS, q_bar, NULL};
     carom_gradient g = {0};
@@ -383,6 +385,7 @@ static void gradient_is_that_of_the_library(void **state)
     g.friction = friction;
     g.force_steps = steps;
     g.anchors = anchors;
+    g.dt = &dt;
     assert_true(carom_tape_gradient(tape, 1, &bar, &g, NULL) >= 0);
 
     assert_int_equal(m->wanted, wanted);
@@ -395,6 +398,8 @@ static void gradient_is_that_of_the_library(void **state)
     assert_memory_equal(m->force_steps, steps, sizeof steps);
     assert_int_equal(m->num_anchors, 4);
     assert_memory_equal(m->anchors, anchors, sizeof anchors);
+    assert_int_equal(m->num_dt, 1);
+    assert_memory_equal(m->dt, &dt, sizeof dt);
     assert_true(near_norm(N, friction) > 0); /* the disc rubs on the floor */
     assert_near(m->cost, 1.5, 0);
     carom_parameter_gradient_t_destroy(m);
@@ -566,23 +571,26 @@ static void bad_descents_are_refused(void **state)
     d = descent_of(5, CAROM_PARAMETER_GRADIENT_T_FORCE_STEPS, 1);
     bench_do(b, pack_descent(&d));
     expect(b, CAROM_REPLY_T_REFUSED, 5, 6, "force_steps");
-    d = descent_of(6, CAROM_PARAMETER_GRADIENT_T_Q0, 1);
+    d = descent_of(6, 1 << 20, 1);
+    bench_do(b, pack_descent(&d));
+    expect(b, CAROM_REPLY_T_REFUSED, 6, 7, "the bits 1048576 name no parameter");
+    d = descent_of(7, CAROM_PARAMETER_GRADIENT_T_Q0, 1);
     d.num_q0 = 12;
     d.q0 = vertices;
     d.first_step = 3;
     bench_do(b, pack_descent(&d));
-    expect(b, CAROM_REPLY_T_REFUSED, 6, 7, "step 3");
+    expect(b, CAROM_REPLY_T_REFUSED, 7, 8, "step 3");
     /* A floor turned inside out is no hull: the scene stays as it was. */
     vertices[0] = -30;
     vertices[2] = 30;
-    d = descent_of(7, CAROM_PARAMETER_GRADIENT_T_VERTICES, 1);
+    d = descent_of(8, CAROM_PARAMETER_GRADIENT_T_VERTICES, 1);
     d.num_vertices = 16;
     d.vertices = vertices;
     bench_do(b, pack_descent(&d));
-    expect(b, CAROM_REPLY_T_REFUSED, 7, 8, "vertex");
+    expect(b, CAROM_REPLY_T_REFUSED, 8, 9, "vertex");
     assert_int_equal(bench_count(b, CRM_WIRE_SCENE_UPDATED), 0);
-    do_steps(b, 8, 0, 3, 0);
-    expect(b, CAROM_REPLY_T_OK, 8, 9, "");
+    do_steps(b, 9, 0, 3, 0);
+    expect(b, CAROM_REPLY_T_OK, 9, 10, "");
     bench_destroy(b);
 }
 

@@ -133,6 +133,7 @@ static void view_gradient(const carom_client *c, carom_client_gradient *g)
     g->radius = given(m, CAROM_WRT_RADIUS, m->radius);
     g->vertices = given(m, CAROM_WRT_VERTICES, m->vertices);
     g->anchors = given(m, CAROM_WRT_ANCHORS, m->anchors);
+    g->dt = given(m, CAROM_WRT_DT, m->dt);
 }
 
 /* 1: the arrays have the sizes that the scene implies. */
@@ -157,6 +158,7 @@ static int sizes_fit(const carom_client *c)
         {CAROM_WRT_RADIUS, m->num_radius, s->num_shapes},
         {CAROM_WRT_VERTICES, m->num_vertices, s->num_vertex_coords},
         {CAROM_WRT_ANCHORS, m->num_anchors, 4 * (int64_t)s->num_joints},
+        {CAROM_WRT_DT, m->num_dt, 1},
     };
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         if (sizes[i].has != (w & sizes[i].bit ? sizes[i].needs : 0)) return 0;

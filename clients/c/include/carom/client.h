@@ -124,7 +124,8 @@ enum {
     CAROM_WRT_FORCE_STEPS = 256,
     CAROM_WRT_RADIUS = 512,
     CAROM_WRT_VERTICES = 1024,
-    CAROM_WRT_ANCHORS = 2048
+    CAROM_WRT_ANCHORS = 2048,
+    CAROM_WRT_DT = 4096
 };
 
 /* Sizes and meaning as in carom_gradient; arrays that were not wanted are NULL. */
@@ -137,7 +138,7 @@ typedef struct carom_client_gradient {
     int64_t first_degenerate_step; /* -1: none */
     int n_bodies, n_shapes, n_vertices, n_joints;
     const double *q0, *v0, *mass, *inertia, *friction, *restitution, *gravity, *force, *force_steps;
-    const double *radius, *vertices, *anchors;
+    const double *radius, *vertices, *anchors, *dt;
 } carom_client_gradient;
 
 /* Gradient of sum_k <q_bar_k, q_k> + <v_bar_k, v_k> over recorded states; steps are counted as in
