@@ -186,10 +186,10 @@ static int make_keys(carom_broadphase *bp, grid *g, int m, const carom_box *boxe
 {
     g->column_bits = bits_of(columns.high - columns.low + 2 * SPAN_MAX);
     for (int i = 0; i < m; i++) {
-        place p;
+        place p = {0, 0, 0};
         place_of(g, &boxes[bp->order.at[i]], &p);
-        const uint64_t column = (uint64_t)(p.column - columns.low + SPAN_MAX);
-        const uint64_t row = (uint64_t)(p.row - rows.low);
+        const uint64_t column = (uint64_t)((int64_t)p.column - columns.low + SPAN_MAX);
+        const uint64_t row = (uint64_t)((int64_t)p.row - rows.low);
         bp->key.at[i] = (row << g->column_bits | column) << SPAN_BITS | (uint64_t)p.span;
     }
     return bits_of(rows.high - rows.low) + g->column_bits + SPAN_BITS;

@@ -2,6 +2,7 @@
 #include "collide/kernels.h"
 
 #include <assert.h>
+#include <string.h>
 
 typedef struct point_point {
     carom_vec2 n;
@@ -28,6 +29,7 @@ static void see_edge_point(const crm_placed *p, const crm_placed *q, carom_recip
 {
     const carom_vec2 start = crm_arm(p, r.ref);
     const carom_vec2 i = crm_arm(q, r.inc);
+    memset(k, 0, sizeof *k);
     k->p = p;
     k->q = q;
     k->d = crm_sub(q->at, p->at);

@@ -38,11 +38,13 @@ static void gather_seen(const crm_placed *a, const crm_placed *b, few *f)
     f->y[f->n] = f->y[0];
 }
 
-/* Keys of p's faces; the index of the largest, and of that the first.  A point has none. */
+/* Keys of p's faces; the index of the largest, and of that the first.  A point has one, lower than
+ * any. */
 static int keys_of(const few *p, const few *q, double *key)
 {
     double top = -HUGE_VAL;
     int at = 0;
+    key[0] = -HUGE_VAL;
     for (int k = 0; p->n > 1 && k < p->n; k++) {
         const double ux = p->y[k + 1] - p->y[k];
         const double uy = p->x[k] - p->x[k + 1];
@@ -107,9 +109,8 @@ static int first_above(int n, const double *key, double least)
 static void take_face(const crm_placed *a, const few *fa, const crm_placed *b, const few *fb, int k,
                       crm_closest *out)
 {
-    const int n_a = a->n > 1 ? a->n : 0;
-    if (k >= n_a) {
-        crm_face_at(b, k - n_a, a, lowest_over(fb, k - n_a, fa), 1, out);
+    if (k >= a->n) {
+        crm_face_at(b, k - a->n, a, lowest_over(fb, k - a->n, fa), 1, out);
     } else {
         crm_face_at(a, k, b, lowest_over(fa, k, fb), 0, out);
     }
@@ -122,20 +123,18 @@ void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_c
     double key[2 * CRM_FEW];
     gather(a, &fa);
     gather_seen(a, b, &fb);
-    const int n_a = a->n > 1 ? a->n : 0;
-    const int n = n_a + (b->n > 1 ? b->n : 0);
     /* Clearly farther: what is just within reach is for the distance itself to decide. */
     const double tie = crm_tie(a, b);
     const double far = (reach + tie) * (reach + tie);
+    const int n = a->n + b->n;
     const int top_a = keys_of(&fa, &fb, key);
-    if (n_a && key[top_a] > far) {
+    if (key[top_a] > far) {
         apart_by(sqrt(key[top_a]), out);
         return;
     }
-    const int top_b = n_a + keys_of(&fb, &fa, key + n_a);
-    const double high_a = n_a ? key[top_a] : -HUGE_VAL;
-    const double high_b = n > n_a ? key[top_b] : -HUGE_VAL;
-    const int top = high_a >= high_b ? top_a : top_b;
+    const int top_b = a->n + keys_of(&fb, &fa, key + a->n);
+    /* Which is unpredictable: no branch. */
+    const int top = top_a + (key[top_b] > key[top_a]) * (top_b - top_a);
     if (key[top] > far) {
         apart_by(sqrt(key[top]), out);
         return;
