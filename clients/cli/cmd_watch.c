@@ -19,6 +19,8 @@ typedef struct watching {
     crm_output out;
     crm_wire_limits limits;
     long seen;
+    int n_subscriptions;
+    lcm_subscription_t *subscriptions[3];
 } watching;
 
 static void put_integer(crm_output *out, const char *key, int64_t x)
@@ -140,7 +142,14 @@ static int subscribe(lcm_t *lcm, const char *name, crm_wire_type type, lcm_msg_h
     lcm_subscription_t *s = lcm_subscribe(lcm, channel, handler, w);
     if (!s) return 0;
     lcm_subscription_set_queue_capacity(s, 0); /* no limit */
+    w->subscriptions[w->n_subscriptions++] = s;
     return 1;
+}
+
+/* lcm_destroy alone would leak what the TCP transport keeps of each. */
+static void unsubscribe(lcm_t *lcm, watching *w)
+{
+    while (w->n_subscriptions > 0) lcm_unsubscribe(lcm, w->subscriptions[--w->n_subscriptions]);
 }
 
 /* Until the time is up, enough was seen, or an interruption; 0: the connection broke. */
@@ -165,6 +174,7 @@ static int watch(const crm_arguments *a, lcm_t *lcm, const char *url)
     watching w;
     w.limits = crm_wire_default_limits();
     w.seen = 0;
+    w.n_subscriptions = 0;
     if (!crm_argument_number(a, "--for", 0, 1e9, &seconds) ||
         !crm_argument_number(a, "--count", 1, 1e9, &count)) {
         return CRM_USAGE;
@@ -176,6 +186,7 @@ static int watch(const crm_arguments *a, lcm_t *lcm, const char *url)
                subscribe(lcm, name, CRM_WIRE_REPLY, on_reply, &w) &&
                subscribe(lcm, name, CRM_WIRE_STATUS, on_status, &w);
     if (good) good = listen(lcm, &w, seconds, count);
+    unsubscribe(lcm, &w);
     if (!good) fprintf(stderr, "carom watch: no connection to %s; start a server: caromd\n", url);
     return crm_output_close(&w.out) && good ? CRM_DONE : CRM_FAILED;
 }
