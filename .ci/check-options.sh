@@ -67,6 +67,10 @@ for option in $declared; do
     grep -q "$option" docs/development.md || fail "$option is not in docs/development.md"
 done
 
+for option in $(grep -rhoE --include=CMakeLists.txt 'set\(CAROM_[A-Z_]+ .* CACHE' . | sed 's/set(//; s/ .*//'); do
+    grep -q "$option" docs/development.md || fail "$option is not in docs/development.md"
+done
+
 default() {
     sed -n "s/^option($1 .* \([^ ]*\))\$/\1/p" CMakeLists.txt | sed 's/.{CAROM_TOP}/ON/'
 }
