@@ -28,7 +28,7 @@ typedef struct fault_case {
     "counterclockwise"
 #define TEXT_RADIUS "the radius must be finite and >= 0, and > 0 for a circle"
 #define TEXT_NAN    "a coordinate is NaN or infinite; give finite numbers"
-#define TEXT_SIZE   "a length is outside 1e-100 .. 1e100 m; scale the shape"
+#define TEXT_SIZE   "a length is outside 1e-40 .. 1e40 m; scale the shape"
 #define TEXT_AREA                                                                                  \
     "the area is nearly zero; give a segment of two vertices or move the vertices apart"
 
@@ -183,10 +183,10 @@ static const fault_case FAULTS[] = {
      "vertex 4: " TEXT_CROSSING,
      {{0, 0}, {1, 0}, {0, 1}, {0, 0}, {1, 0}, {0, 1}}},
     {"thin", 0, 3, CAROM_SHAPE_AREA, -1, TEXT_AREA, {{0, 0}, {1, 0}, {0.5, 1.9e-12}}},
-    {"too far out", 0, 2, CAROM_SHAPE_SIZE, 1, "vertex 1: " TEXT_SIZE, {{0, 0}, {0, -1e101}}},
-    {"too small", 0, 3, CAROM_SHAPE_SIZE, -1, TEXT_SIZE, {{0, 0}, {1e-101, 0}, {0, 1e-101}}},
-    {"radius too large", 1e101, 1, CAROM_SHAPE_SIZE, -1, TEXT_SIZE, {{0, 0}}},
-    {"radius too small", 1e-101, 1, CAROM_SHAPE_SIZE, -1, TEXT_SIZE, {{0, 0}}},
+    {"too far out", 0, 2, CAROM_SHAPE_SIZE, 1, "vertex 1: " TEXT_SIZE, {{0, 0}, {0, -1e41}}},
+    {"too small", 0, 3, CAROM_SHAPE_SIZE, -1, TEXT_SIZE, {{0, 0}, {1e-41, 0}, {0, 1e-41}}},
+    {"radius too large", 1e41, 1, CAROM_SHAPE_SIZE, -1, TEXT_SIZE, {{0, 0}}},
+    {"radius too small", 1e-41, 1, CAROM_SHAPE_SIZE, -1, TEXT_SIZE, {{0, 0}}},
 };
 
 static void faults_are_named(void **state)
@@ -251,7 +251,7 @@ static void good_shapes_pass(void **state)
     accept("needle", 0, 3, thin);
     accept("nearly flat", 0, 4, nearly_flat);
     carom_vec2 v[4];
-    const double sizes[] = {1e-99, 1e-8, 1e8, 1e99};
+    const double sizes[] = {1e-39, 1e-8, 1e8, 1e39};
     for (int k = 0; k < 4; k++) {
         for (int i = 0; i < 4; i++) {
             v[i].x = sizes[k] * box[i].x;

@@ -22,25 +22,25 @@ static void gather(const crm_placed *p, few *f)
     f->y[f->n] = f->y[0];
 }
 
-static void gather_seen(const crm_placed *a, const crm_placed *b, few *f)
+/* b's vertices turned into a's frame, still from b's position. */
+static void gather_turned(const crm_placed *a, const crm_placed *b, few *f)
 {
     const double c = a->cos * b->cos + a->sin * b->sin;
     const double s = a->cos * b->sin - a->sin * b->cos;
-    const carom_vec2 at = crm_turn_back(a, crm_sub(b->at, a->at));
     f->n = b->n;
     int i = 0;
     do {
         const carom_vec2 v = b->v[i];
-        f->x[i] = at.x + (c * v.x - s * v.y);
-        f->y[i] = at.y + (s * v.x + c * v.y);
+        f->x[i] = c * v.x - s * v.y;
+        f->y[i] = s * v.x + c * v.y;
     } while (++i < b->n);
     f->x[f->n] = f->x[0];
     f->y[f->n] = f->y[0];
 }
 
-/* Keys of p's faces; the index of the largest, and of that the first.  A point has one, lower than
- * any. */
-static int keys_of(const few *p, const few *q, double *key)
+/* Keys of p's faces, d from p's position to q's; the index of the largest, and of that the first. A
+ * point has one, lower than any. */
+static int keys_of(const few *p, const few *q, carom_vec2 d, double *key)
 {
     double top = -HUGE_VAL;
     int at = 0;
@@ -53,7 +53,7 @@ static int keys_of(const few *p, const few *q, double *key)
             const double s = ux * q->x[j] + uy * q->y[j];
             low = s < low ? s : low;
         }
-        const double s = low - (ux * p->x[k] + uy * p->y[k]);
+        const double s = low + (ux * (d.x - p->x[k]) + uy * (d.y - p->y[k]));
         key[k] = s * fabs(s) / (ux * ux + uy * uy);
         at = key[k] > top ? k : at;
         top = key[k] > top ? key[k] : top;
@@ -122,17 +122,18 @@ void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_c
     few fb;
     double key[2 * CRM_FEW];
     gather(a, &fa);
-    gather_seen(a, b, &fb);
+    gather_turned(a, b, &fb);
+    const carom_vec2 d = crm_turn_back(a, crm_sub(b->at, a->at));
     /* Clearly farther: what is just within reach is for the distance itself to decide. */
     const double tie = crm_tie(a, b);
     const double far = (reach + tie) * (reach + tie);
     const int n = a->n + b->n;
-    const int top_a = keys_of(&fa, &fb, key);
+    const int top_a = keys_of(&fa, &fb, d, key);
     if (key[top_a] > far) {
         apart_by(sqrt(key[top_a]), out);
         return;
     }
-    const int top_b = a->n + keys_of(&fb, &fa, key + a->n);
+    const int top_b = a->n + keys_of(&fb, &fa, crm_neg(d), key + a->n);
     /* Which is unpredictable: no branch. */
     const int top = top_a + (key[top_b] > key[top_a]) * (top_b - top_a);
     if (key[top] > far) {

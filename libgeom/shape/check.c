@@ -9,9 +9,9 @@
 /* Lengths below this are zero [1], times the extent [m]; areas, times its square. */
 static const double SHAPE_TOL = 1e-12;
 
-/* Lengths whose squares and fourth powers stay far from overflow and underflow. */
-static const double SIZE_MAX_M = 1e100;
-static const double SIZE_MIN_M = 1e-100;
+/* Lengths whose sixth powers, and those of edges 1e-12 of them, neither overflow nor underflow. */
+static const double SIZE_MAX_M = 1e40;
+static const double SIZE_MIN_M = 1e-40;
 
 static const double PI = 3.14159265358979323846;
 
@@ -206,7 +206,7 @@ static const char *sentence(carom_shape_fault what)
     case CAROM_SHAPE_AREA:
         return "the area is nearly zero; give a segment of two vertices or move "
                "the vertices apart";
-    case CAROM_SHAPE_SIZE: return "a length is outside 1e-100 .. 1e100 m; scale the shape";
+    case CAROM_SHAPE_SIZE: return "a length is outside 1e-40 .. 1e40 m; scale the shape";
     case CAROM_SHAPE_FOLD:
         return "the chain turns back onto itself; move the vertex or end the chain there";
     }

@@ -8,7 +8,9 @@
  * what carom_shape_check asks for, so that areas pass too. */
 static const double HULL_TOL = 4e-12;
 
-static const double SIZE_MAX_M = 1e100;
+/* The limits of carom_shape_check. */
+static const double SIZE_MAX_M = 1e40;
+static const double SIZE_MIN_M = 1e-40;
 
 static int is_before(const carom_vec2 *p, int i, int j)
 {
@@ -145,7 +147,7 @@ carom_status carom_hull_from_points(int n, const carom_vec2 *points, int *index,
         if (is_before(points, right, i)) right = i;
     }
     const double extent = extent_of(n, points);
-    if (!(extent > 0)) {
+    if (!(extent >= SIZE_MIN_M)) {
         index[0] = 0;
         *count = 1;
         return CAROM_OK;

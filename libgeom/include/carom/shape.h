@@ -32,8 +32,8 @@ typedef enum carom_shape_fault {
                              */
     CAROM_SHAPE_CROSSING,   /* the outline crosses itself, or winds around more than once */
     CAROM_SHAPE_AREA,       /* area below 1e-12 of the squared extent */
-    CAROM_SHAPE_SIZE,       /* a length outside 1e-100 .. 1e100 m: its square could overflow */
-    CAROM_SHAPE_FOLD        /* chains: at a vertex the chain turns back onto itself */
+    CAROM_SHAPE_SIZE, /* a length outside 1e-40 .. 1e40 m: products of squares could overflow */
+    CAROM_SHAPE_FOLD  /* chains: at a vertex the chain turns back onto itself */
 } carom_shape_fault;
 
 typedef struct carom_shape_error {
@@ -51,9 +51,9 @@ CAROM_API void carom_shape_error_text(carom_shape_error error, char *text, size_
 /* Convex hull of points[n], n >= 1: writes to index[n] the indices of its vertices,
  * counterclockwise from the leftmost (of these the lowest) point, and their number to *count.
  * Points within 4e-12 of the extent of the line through their neighbors are left out, so the hull
- * passes carom_shape_check when *count >= 3; 2: all points are on a line, 1: at one place.  Of
- * equal points one is taken.  With v[i] = points[index[i]] the reverse derivative is
- * points_bar[index[i]] += v_bar[i]. CAROM_E_ARGUMENT: a coordinate is not finite or exceeds 1e100.
+ * passes carom_shape_check when *count >= 3; 2: all points are on a line, 1: at one place (within
+ * 1e-40).  Of equal points one is taken.  With v[i] = points[index[i]] the reverse derivative is
+ * points_bar[index[i]] += v_bar[i]. CAROM_E_ARGUMENT: a coordinate is not finite or exceeds 1e40.
  */
 CAROM_API carom_status carom_hull_from_points(int n, const carom_vec2 *points, int *index,
                                               int *count);
