@@ -64,7 +64,7 @@ class Blocking(WithServer):
         self.client.step(4, every=0, record=True)
         bar = np.array([[0, 1.0, 0]])
         g = self.client.gradient({4: (bar, None), 0: (None, 7 * bar)}, cost=1.5,
-                                 wrt=("q0", "v0", "mass", "force", "force_steps"))
+                                 wrt=("q0", "v0", "mass", "force", "force_steps", "dt"))
         s = 0.0625 * 10
         self.assertEqual(g.cost, 1.5)
         self.assertEqual((g.first_step, g.recorded_steps), (0, 4))
@@ -74,6 +74,8 @@ class Blocking(WithServer):
         np.testing.assert_allclose(g.force, [[0, s / 2, 0]], atol=1e-15)
         self.assertEqual(g.force_steps.shape, (4, 1, 3))
         np.testing.assert_allclose(g.force_steps[:, 0, 1], np.arange(4, 0, -1) * 0.0625 / 2, atol=1e-15)
+        # d/dh (n h v_0 + (F/m) h^2 n (n + 1)/2)
+        np.testing.assert_allclose(g.dt, [4 * 3 + 2 * 2.5 * 0.25 * 10], atol=1e-13)
         self.assertIsNone(g.inertia)
 
     def test_forces_of_steps_and_tables(self):
@@ -214,10 +216,10 @@ class Asynchronous(WithServer):
         async def session():
             async with AsyncClient(self.server.url) as client:
                 await client.open(free_body())
-                parts = await asyncio.gather(*[client.step(10, every=5) for _ in range(8)])
+                parts = await asyncio.gather(*[client.step(10, every=5) for _ in range(40)])
                 return [s.step for part in parts for s in part]
 
-        self.assertEqual(asyncio.run(session()), list(range(5, 81, 5)))
+        self.assertEqual(asyncio.run(session()), list(range(5, 401, 5)))
 
     def test_sessions_side_by_side(self):
         async def one(speed):

@@ -27,6 +27,7 @@ class Bus:
         self.sent = 0
         self.silent = False
         self.boot_id = 77
+        self.window = 8
         self.next_seq = 1
         self.step = 0
         self.answers = {}  # seq -> [(channel, message)]
@@ -61,7 +62,7 @@ class Bus:
         out = reply_t()
         out.client_id, out.session, out.seq = message.client_id, message.session, message.seq
         out.reply_code, out.boot_id, out.step, out.next_seq = code, self.boot_id, self.step, self.next_seq
-        out.chunk_index = -1
+        out.chunk_index, out.window = -1, self.window
         for name, value in fields.items():
             setattr(out, name, value)
         return out
@@ -152,12 +153,23 @@ class Loss(unittest.TestCase):
         for seed in range(20):
             bus = Bus(loss=0.3, seed=seed)
             bus.wait(bus.open())
-            under_way = [bus.steps(5, every=0) for _ in range(4)]
+            under_way = [bus.steps(5, every=0) for _ in range(20)]
             for exchange in under_way:
                 bus.wait(exchange)
                 self.assertIsNone(exchange.error)
-            self.assertEqual(bus.executed, [1, 2, 3, 4, 5])
-            self.assertEqual(bus.protocol.step, 20)
+            self.assertEqual(bus.executed, list(range(1, 22)))
+            self.assertEqual(bus.protocol.step, 100)
+
+    def test_no_more_than_the_window(self):
+        bus = Bus()
+        bus.window = 3
+        bus.wait(bus.open())
+        bus.silent = True
+        under_way = [bus.steps(1) for _ in range(10)]
+        self.assertEqual(sum(e.sent for e in under_way), 3)
+        bus.silent = False
+        for exchange in under_way:
+            self.assertIsNone(bus.wait(exchange).error)
 
     def test_large_scenes_go_in_pieces(self):
         for loss in (0.0, 0.3):
@@ -219,6 +231,19 @@ class Refusals(unittest.TestCase):
         bus.wait(bus.open())
         bus.protocol.planned_step = 3
         self.assertIsInstance(bus.wait(bus.steps(1)).error, Refused)
+
+    def test_a_request_that_was_not_taken_frees_its_number(self):
+        bus = Bus()
+        bus.wait(bus.open())
+        bus.silent = True
+        first, second = bus.steps(1), bus.steps(1)
+        reply = bus.reply(first.message, reply_t.LIMIT, reply_text="too large")
+        bus.protocol.receive("CAROM_REPLY", reply.encode())
+        self.assertIsInstance(first.error, Refused)
+        self.assertIsInstance(second.error, Refused)
+        bus.silent = False
+        self.assertIsNone(bus.wait(bus.steps(1)).error)
+        self.assertEqual(bus.executed, [1, 2])
 
     def test_another_boot_loses_the_session(self):
         bus = Bus()

@@ -9,7 +9,7 @@ import numpy as np
 from .errors import CaromError
 from .exchange import Exchange, Protocol, check, session_request
 from .messages import loss_gradient_t, parameter_gradient_t, scene_t, step_request_t
-from .results import WRT, gradient_of, parameters_of, state_of
+from .results import NO_PARAMETER, WRT, gradient_of, parameters_of, state_of
 
 
 def scene_message(scene):
@@ -186,7 +186,9 @@ class Calls:
 
         Then the session is at step 0 again, or, with keep_state, goes on from its present state."""
         message = parameter_gradient_t()
-        for name in gradient.wanted() if wrt is None else wrt:
+        if wrt is None:
+            wrt = [name for name in gradient.wanted() if name not in NO_PARAMETER]
+        for name in wrt:
             values = np.ravel(getattr(gradient, name)).tolist()
             message.wanted |= WRT[name]
             setattr(message, name, values)

@@ -8,6 +8,7 @@ by step.
 
 from __future__ import annotations
 
+import math
 import secrets
 import time
 
@@ -126,6 +127,7 @@ class Protocol:
         self.step = 0  # the session is at, as far as answered
         self.planned_step = 0  # after the requests under way
         self.first_step = 0  # at which the tape starts
+        self.window = 8  # requests that may be under way at once
         self.snapshots = {}  # number -> step
         self.repeated = 0  # requests sent again
         self.resent = 0  # states asked for again
@@ -149,10 +151,18 @@ class Protocol:
         message.session = self.session
         message.utime = time.time_ns() // 1000
         self.pending[message.seq] = exchange
-        now = self._clock()
-        exchange.deadline = now + self.timeout
-        self._send(exchange, now)
+        exchange.deadline = self._clock() + self.timeout
+        exchange.next_send = math.inf
+        self._send_waiting()
         return exchange
+
+    def _send_waiting(self):
+        """Sends requests for the first time, in order, as far as the server's window goes."""
+        under_way = sum(e.sent > 0 for e in self.pending.values())
+        for seq in sorted(self.pending):
+            if self.pending[seq].sent == 0 and under_way < self.window:
+                self._send(self.pending[seq], self._clock())
+                under_way += 1
 
     def scene(self, message):
         """The exchange of a scene: in pieces when it is large."""
@@ -216,6 +226,8 @@ class Protocol:
             return
         if message.client_id != self.client_id or message.session != self.session:
             return
+        if kind == "CAROM_REPLY" and self._is_stale(message):
+            return
         self._heard = True
         exchange = self.pending.get(message.seq)
         now = self._clock()
@@ -239,6 +251,7 @@ class Protocol:
             self._lose("the server was started again; open the scene once more")
             return
         self.boot_id = reply.boot_id
+        self.window = max(1, reply.window)
         if reply.reply_code == reply_t.NO_SESSION:
             self._lose(f"{reply.reply_text or 'the session expired'}; open the scene once more")
         elif reply.reply_code == reply_t.GAP:
@@ -250,14 +263,18 @@ class Protocol:
         code = reply.reply_code
         if code == reply_t.CHUNK:
             exchange.acknowledge(reply)
-        elif code in (reply_t.PENDING, reply_t.BUSY):
+        elif code == reply_t.PENDING:
             exchange.wait = LONGEST_WAIT
+        elif code == reply_t.BUSY:
+            return  # not taken: it is sent again in its time
         elif code in (reply_t.OK, reply_t.FAILED):
             exchange.reply = reply
             self._complete(exchange)
             if not exchange.done:  # something that came before the reply was lost
                 exchange.wait = FIRST_WAIT
                 exchange.next_send = min(exchange.next_send, self._clock() + FIRST_WAIT)
+        elif code in (reply_t.MALFORMED, reply_t.LIMIT):
+            self._withdraw(exchange, Refused(reply.reply_text or f"reply code {code}"))
         elif code == reply_t.FORGOTTEN:
             self._fail(exchange, SessionLost("the answer is no longer kept by the server"))
         else:
@@ -281,19 +298,30 @@ class Protocol:
         else:
             self._finish(exchange)
 
+    def _withdraw(self, exchange, error):
+        """The request was not taken: its number is free again, and what follows it goes with it."""
+        seq = exchange.message.seq
+        self._fail_all([e for s, e in self.pending.items() if s >= seq], error)
+        self._seq = seq - 1
+
     def _fill_gap(self, reply):
         """An earlier request did not arrive: it is sent again at once."""
-        first = self.pending.get(reply.next_seq)
-        if first is None:
-            self._lose(f"the server waits for request {reply.next_seq}, which was answered before")
-        else:
-            first.next_send = 0.0
+        self.pending[reply.next_seq].next_send = 0.0
+
+    def _is_stale(self, reply):
+        """A gap that was filled meanwhile."""
+        return reply.reply_code == reply_t.GAP and reply.next_seq not in self.pending
 
     def _lose(self, text):
-        for exchange in list(self.pending.values()):
-            self._fail(exchange, SessionLost(text))
+        self._fail_all(list(self.pending.values()), SessionLost(text))
         self.boot_id = None
         self.lost = True
+
+    def _fail_all(self, exchanges, error):
+        for exchange in exchanges:
+            self.pending.pop(exchange.message.seq)
+        for exchange in exchanges:
+            self._fail(exchange, error)
 
     def _fail(self, exchange, error):
         exchange.error = error
@@ -303,6 +331,7 @@ class Protocol:
     def _finish(self, exchange):
         exchange.done = True
         self.pending.pop(exchange.message.seq, None)
+        self._send_waiting()
 
     def renew_session(self):
         """After a loss: the next scene opens a session of another number, counting from 1."""

@@ -8,7 +8,11 @@ import numpy as np
 
 # Bits of parameter_gradient_t.wanted, in the order of its arrays.
 WRT = {"q0": 1, "v0": 2, "mass": 4, "inertia": 8, "friction": 16, "restitution": 32, "gravity": 64,
-       "force": 128, "force_steps": 256, "radius": 512, "vertices": 1024, "anchors": 2048}
+       "force": 128, "force_steps": 256, "radius": 512, "vertices": 1024, "anchors": 2048,
+       "dt": 4096}
+
+# What has a gradient but is no parameter of a session: a descent leaves it alone.
+NO_PARAMETER = ("force_steps", "dt")
 
 # Shape of each array behind its first axis.
 _TAIL = {"q0": (3,), "v0": (3,), "force": (3,), "vertices": (2,), "anchors": (2, 2)}
@@ -88,6 +92,7 @@ class Gradient:
     radius: np.ndarray | None = None  # (shapes,)
     vertices: np.ndarray | None = None  # (vertices, 2)
     anchors: np.ndarray | None = None  # (joints, 2, 2)
+    dt: np.ndarray | None = None  # (1,): length of a step
     message: object = None  # the parameter_gradient_t itself
 
     def wanted(self):
