@@ -26,14 +26,14 @@ static int validate_file(const char *file)
     crm_scene *scene = crm_scene_read(&problems);
     if (scene) check_world(&problems, scene);
     crm_print_problems(&problems);
-    if (problems.count) {
+    if (problems.count || !scene) {
         fprintf(stderr, "%s: %d %s\n", problems.file, problems.count,
                 problems.count == 1 ? "error" : "errors");
     } else {
         printf("%s: valid, %d bodies, %d joints\n", problems.file, scene->n_bodies,
                scene->n_joints);
     }
-    const int code = problems.count ? CRM_USAGE : CRM_DONE;
+    const int code = problems.count || !scene ? CRM_USAGE : CRM_DONE;
     crm_scene_free(scene);
     crm_problems_free(&problems);
     return code;

@@ -78,7 +78,7 @@ static int compare_keys(const void *a, const void *b)
 static void close_level(scanner *s)
 {
     level *l = &s->levels[s->depth - 1];
-    const int n = s->n_keys - l->first_key;
+    const int n = s->keys ? s->n_keys - l->first_key : 0;
     span *keys = s->keys ? s->keys + l->first_key : NULL;
     if (n > 1) qsort(keys, (size_t)n, sizeof *keys, compare_keys);
     for (int i = 1; i < n; i++) {

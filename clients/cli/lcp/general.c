@@ -122,7 +122,7 @@ static general make_general(const crm_lcp *lcp)
     g.A = compress(&joints, 3 * lcp->n_bodies);
     g.G = make_g(lcp, &g);
     g.F = make_f(lcp, &g);
-    const size_t n = (size_t)(g.n_ineq + lcp->n_joint_rows);
+    const size_t n = (size_t)g.n_ineq + (size_t)lcp->n_joint_rows;
     g.m = crm_resize(NULL, n, sizeof *g.m);
     memset(g.m, 0, n * sizeof *g.m);
     memcpy(g.m, lcp->c, (size_t)g.n_c * sizeof *g.m);
