@@ -43,7 +43,6 @@ void carom_contact_destroy(carom_contact_solver *solver)
     crm_graph_free(m, &solver->graph);
     crm_block_pattern_free(m, &solver->pattern);
     crm_system_free(m, &solver->system);
-    crm_arena_free(m, &solver->lemke);
     crm_free(m, solver->scratch, (size_t)solver->scratch_max, sizeof(double));
     crm_free(m, solver->certificate, (size_t)solver->certificate_max, sizeof(double));
     crm_memory last = *m;
@@ -151,19 +150,18 @@ static carom_status solve_island(carom_contact_solver *c, const carom_contact_pr
     crm_system_gather(&c->system, g, p, island);
     crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
     s.accept = c->settings.accept;
+    s.inexact = c->settings.inexact;
     s.max_iterations = c->settings.max_iterations;
+    s.max_restarts = c->settings.max_restarts;
     if (use_guess) crm_system_read(&c->system, g, &s, island, x, use_guess);
-    const crm_ladder ladder = {&c->memory, &c->lemke, c->settings.max_restarts,
-                               c->settings.inexact};
     carom_contact_stage stage;
     double unpolished;
-    carom_status status = crm_ladder_climb(&ladder, &s, use_guess, &stage, &unpolished);
+    const carom_status status = crm_ladder_climb(&s, use_guess, &stage, &unpolished);
     stats->factorizations += s.factorizations;
     stats->iterations += s.iterations;
     if (s.factorizations) stats->blocks += 2 * (s.lu.lp[s.lu.n] - s.lu.lp[0]) + s.lu.n;
     if (stage > stats->stage) stats->stage = stage;
     if (status == CAROM_E_INFEASIBLE) return give_certificate(c, p, &s, island);
-    if (status == CAROM_E_MEMORY) return status;
     stats->residual_unpolished = fmax(stats->residual_unpolished, unpolished);
     stats->degenerate += count_degenerate(&s);
     return CAROM_OK;

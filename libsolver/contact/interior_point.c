@@ -106,6 +106,28 @@ static void begin(interior *p, const crm_interior_start *start)
     }
 }
 
+/* From s->x, moved by `shift` into the interior: near a solution, without its decisions. */
+static void begin_near(interior *p, const crm_interior_start *start)
+{
+    crm_island *s = p->s;
+    const double shift = start->shift;
+    p->n_products = 0;
+    p->fraction = start->fraction;
+    crm_island_residual(s, s->x); /* leaves a and u */
+    for (int k = 0; k < s->nc; k++) {
+        s->x.n[k] = fmax(s->x.n[k], shift);
+        p->a[k] = fmax(s->an[k], shift);
+        p->n_products++;
+        if (!has_cone(p, k)) continue;
+        p->n_products += 2;
+        const double bound = s->contact[k].mu * s->x.n[k];
+        const double inside = bound - fmin(0.5 * bound, 0.3 * shift);
+        s->x.t[k] = fmax(-inside, fmin(inside, s->x.t[k]));
+        p->wp[k] = fmax(s->ut[k], 0) + shift;
+        p->wm[k] = fmax(-s->ut[k], 0) + shift;
+    }
+}
+
 /* Defects of the linear equations at the iterate; returns the largest. */
 static double find_defects(interior *p)
 {
@@ -407,7 +429,10 @@ int crm_interior_point(crm_island *s, crm_interior_start start)
 {
     interior p;
     bind(&p, s);
-    begin(&p, &start);
+    if (start.shift > 0)
+        begin_near(&p, &start);
+    else
+        begin(&p, &start);
     if (!p.n_products) return 0; /* joints alone have no inequality */
     iterate(&p);
     crm_vec_copy(s, s->x, s->top);

@@ -52,7 +52,7 @@ typedef struct crm_response {
     double tt;
 } crm_response;
 
-enum { CRM_N_VECTORS = 8, CRM_N_SLACKS = 19 };
+enum { CRM_N_VECTORS = 9, CRM_N_SLACKS = 19 };
 
 typedef struct crm_island {
     int nb;
@@ -68,7 +68,8 @@ typedef struct crm_island {
     /* Work. */
     crm_vec x;
     crm_vec best;
-    crm_vec top; /* the interior point's own best */
+    crm_vec top;   /* the interior point's own best */
+    crm_vec swept; /* where the sweeps ended */
     crm_vec rhs;
     crm_vec rest;
     crm_vec step;
@@ -81,7 +82,9 @@ typedef struct crm_island {
     unsigned char *best_mode;
     double best_residual;
     double accept;
+    double inexact; /* a point this good ends the restarts early */
     int max_iterations;
+    int max_restarts;
     int factorizations;
     int iterations;
 } crm_island;

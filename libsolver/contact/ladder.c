@@ -6,14 +6,15 @@ enum {
     ROUNDS_TRY = 5,     /* of the active set from a guess */
     ROUNDS_POLISH = 8,  /* after the interior point */
     ROUNDS_REPAIR = 15, /* after sweeps and Lemke */
-    N_SWEEPS = 300,
-    LEMKE_CONTACTS = 150, /* most contacts for Lemke's dense tableau */
+    N_SWEEPS = 300,     /* first bout; each further one is twice as long */
+    N_BOUTS = 5,
+    LEMKE_CONTACTS = 300, /* most contacts for Lemke's method ... */
+    LEMKE_PIVOTS = 20,    /* ... and pivots per contact */
     WIDE_RESTARTS = 6     /* restarts from this one on spread twice as far */
 };
 
 /* One climb. */
 typedef struct climb {
-    const crm_ladder *ladder;
     crm_island *s;
     carom_contact_stage *stage;
     double *unpolished;
@@ -103,27 +104,30 @@ static int try_interior(climb *c, carom_contact_stage stage, crm_interior_start 
     return polish(c, stage, ROUNDS_POLISH);
 }
 
-static int try_sweeps(climb *c)
+/* A bout of sweeps from where the last one ended, then the interior point from there. */
+static int try_sweeps(climb *c, int bout)
 {
-    crm_sweeps(c->s, N_SWEEPS);
-    crm_island_offer(c->s, c->s->x, crm_island_residual(c->s, c->s->x));
-    return polish(c, CAROM_STAGE_SWEEPS, ROUNDS_REPAIR);
+    crm_island *s = c->s;
+    if (!bout) crm_vec_zero(s, s->x);
+    if (bout) crm_vec_copy(s, s->x, s->swept);
+    crm_sweeps(s, N_SWEEPS << bout);
+    crm_vec_copy(s, s->swept, s->x);
+    crm_island_offer(s, s->x, crm_island_residual(s, s->x));
+    if (polish(c, CAROM_STAGE_SWEEPS, ROUNDS_REPAIR)) return 1;
+    for (double shift = 0.1; shift > 0.005; shift *= 0.1) {
+        const crm_interior_start start = {.fraction = 0.95, .shift = shift};
+        crm_vec_copy(s, s->x, s->swept);
+        if (try_interior(c, CAROM_STAGE_SWEEPS, start)) return 1;
+    }
+    return 0;
 }
 
-/* Returns 1 when accepted, or a negative status. */
 static int try_lemke(climb *c)
 {
-    static const double regular[] = {0, 1e-9, 1e-9, 1e-7};
     crm_island *s = c->s;
     if (s->nc > LEMKE_CONTACTS) return 0;
-    crm_arena measure = {0};
-    crm_lemke_layout(s, &measure);
-    const carom_status status =
-        crm_arena_reserve(c->ladder->memory, c->ladder->arena, measure.used);
-    if (status < 0) return status;
-    crm_lemke_work work = crm_lemke_layout(s, c->ladder->arena);
-    for (unsigned i = 0; i < sizeof regular / sizeof *regular; i++) {
-        if (!crm_lemke(s, regular[i], i, &work)) continue;
+    for (unsigned seed = 1; seed <= 2; seed++) {
+        if (!crm_lemke(s, LEMKE_PIVOTS * s->nc + 50, seed)) continue;
         crm_island_offer(s, s->x, crm_island_residual(s, s->x));
         if (polish(c, CAROM_STAGE_LEMKE, ROUNDS_REPAIR)) return 1;
     }
@@ -132,7 +136,7 @@ static int try_lemke(climb *c)
 
 static int try_restarts(climb *c)
 {
-    for (int i = 0; i < c->ladder->max_restarts; i++) {
+    for (int i = 0; i < c->s->max_restarts; i++) {
         const double ln[] = {10, c->large, 1};
         const double slack[] = {0.01, 1, 1};
         const crm_interior_start start = {.ln = ln[i % 3],
@@ -141,15 +145,30 @@ static int try_restarts(climb *c)
                                           .spread = i < WIDE_RESTARTS ? 1 : 2,
                                           .seed = 1 + (unsigned long long)i};
         if (try_interior(c, CAROM_STAGE_RESTART, start)) return 1;
-        if (i > 2 && c->s->best_residual <= c->ladder->inexact) return 0;
+        if (i > 2 && c->s->best_residual <= c->s->inexact) return 0;
     }
     return 0;
 }
 
-carom_status crm_ladder_climb(const crm_ladder *l, crm_island *s, int use_guess,
-                              carom_contact_stage *stage, double *unpolished)
+/* The rungs for what neither a guess nor the first interior point solved. */
+static int try_harder(climb *c)
 {
-    climb c = {l, s, stage, unpolished, 0};
+    const crm_interior_start second = {.ln = 10, .slack = 0.01, .fraction = 0.95};
+    const crm_interior_start third = {.ln = 1, .slack = 1, .fraction = 0.95};
+    if (try_interior(c, CAROM_STAGE_INTERIOR_POINT, second)) return 1;
+    if (try_interior(c, CAROM_STAGE_INTERIOR_POINT, third)) return 1;
+    if (try_sweeps(c, 0) || try_lemke(c)) return 1;
+    for (int bout = 1; bout < N_BOUTS; bout++) {
+        if (try_sweeps(c, bout)) return 1;
+        if (c->s->best_residual <= c->s->inexact) break;
+    }
+    return try_restarts(c);
+}
+
+carom_status crm_ladder_climb(crm_island *s, int use_guess, carom_contact_stage *stage,
+                              double *unpolished)
+{
+    climb c = {s, stage, unpolished, 0};
     *stage = CAROM_STAGE_NONE;
     *unpolished = 0;
     if (is_free(s) || try_active_sets(&c, use_guess)) return CAROM_OK;
@@ -160,12 +179,5 @@ carom_status crm_ladder_climb(const crm_ladder *l, crm_island *s, int use_guess,
     }
     if (crm_farkas(s)) return CAROM_E_INFEASIBLE;
     if (!s->nc) return CAROM_E_NO_SOLUTION;
-    const crm_interior_start second = {.ln = 10, .slack = 0.01, .fraction = 0.95};
-    const crm_interior_start third = {.ln = 1, .slack = 1, .fraction = 0.95};
-    if (try_interior(&c, CAROM_STAGE_INTERIOR_POINT, second)) return CAROM_OK;
-    if (try_interior(&c, CAROM_STAGE_INTERIOR_POINT, third)) return CAROM_OK;
-    if (try_sweeps(&c)) return CAROM_OK;
-    const int lemke = try_lemke(&c);
-    if (lemke) return lemke < 0 ? (carom_status)lemke : CAROM_OK;
-    return try_restarts(&c) ? CAROM_OK : CAROM_E_NO_SOLUTION;
+    return try_harder(&c) ? CAROM_OK : CAROM_E_NO_SOLUTION;
 }

@@ -2,243 +2,225 @@
 
 #include <math.h>
 
-/* Compliance of joint rows when they are eliminated [1]. */
-#define JOINT_COMPLIANCE 1e-12
-/* Smallest entry to pivot on [1]. */
-#define PIVOT_MIN 1e-11
-/* Ratios closer than this tie [1]. */
-#define TIE 1e-13
-/* Entries of the lexicographic comparison closer than this are equal [1]. */
-#define LEX_TIE 1e-14
+/* Compliance of active rows on the path: it makes impulses unique [1]. */
+#define COMPLIANCE 1e-7
+/* Passes of refinement stop when the defect, relative to the solution, is below this [1]. */
+#define DEFECT_DONE 1e-12
+/* A slope that counts as zero [1]. */
+#define SLOPE_ZERO 1e-14
+/* Velocity, in units of V, at which no contact closes; a path that comes back here is a ray. */
+#define TAU_MAX 1e4
 
-crm_lemke_work crm_lemke_layout(const crm_island *s, crm_arena *arena)
+enum { PASSES = 6, REFRESH = 8 };
+
+/* With c_n + tau d, d > 0, instead of c_n all contacts are open for large tau: a solution.  On each
+ * set of modes the solution is linear in tau; where a condition of a mode is about to fail, that
+ * contact takes the adjacent mode and tau goes on in the direction that satisfies the new
+ * condition: back, if need be, so that turning points are passed as in Lemke's tableau. */
+typedef struct path {
+    crm_island *s;
+    crm_vec d; /* n: d_n, t: d_t, z behind the bodies: d_e */
+    crm_vec tangent;
+    double tau;
+    double direction;
+} path;
+
+static double row_n(const crm_island *s, int k, const double *z)
 {
-    crm_lemke_work k = {.n = s->nc};
-    for (int i = 0; i < s->nc; i++) k.n += s->contact[i].mu > 0 ? 3 : 0;
-    const size_t n = (size_t)k.n;
-    k.tableau = crm_arena_take(arena, n * (2 * n + 2), sizeof(double));
-    k.covering = crm_arena_doubles(arena, k.n);
-    k.basis = crm_arena_ints(arena, k.n);
-    k.cone = crm_arena_ints(arena, s->nc);
-    return k;
+    const crm_contact *c = &s->contact[k];
+    return crm_dot(c->n, c->a, c->b, z);
 }
 
-/* Order of the variables: l_n of m contacts, l+ , l- and g of f cones, as in (7). */
-typedef struct numbering {
-    int m;
-    int f;
-} numbering;
-
-/* Row i of the tableau, 2 n + 2 wide. */
-static double *row_of(const crm_lemke_work *k, int i)
+static double row_t(const crm_island *s, int k, const double *z)
 {
-    return k->tableau + (size_t)i * (size_t)(2 * k->n + 2);
+    const crm_contact *c = &s->contact[k];
+    return c->mu > 0 ? crm_dot(c->t, c->a, c->b, z) : 0;
 }
 
-static void no_responses(crm_island *s)
+static int sticks(const crm_island *s, int k)
 {
-    memset(s->response, 0, (size_t)s->nc * sizeof *s->response);
-    crm_island_factor(s, 1, JOINT_COMPLIANCE);
+    return s->mode[k] == CAROM_STICK && s->contact[k].mu > 0;
 }
 
-/* z <- motion that the joints leave of the impulse `row`. */
-static void response_of(crm_island *s, const double *row, const crm_contact *c, double *z)
+/* a and u of contact k at x, for data alpha c + beta d. */
+static double opening(const path *p, int k, crm_vec x, double alpha, double beta)
 {
-    memset(z, 0, 3 * (size_t)(s->nb + s->ng) * sizeof(double));
-    crm_add(z, row, c->a, c->b, 1);
-    crm_island_solve(s, z);
+    const crm_island *s = p->s;
+    const double l = s->mode[k] == CAROM_SEPARATED ? 0 : COMPLIANCE * x.n[k];
+    return row_n(s, k, x.z) + alpha * s->contact[k].cn + beta * p->d.n[k] + l;
 }
 
-/* Motion of the joints alone: -c_e at the groups. */
-static void joint_motion(crm_island *s, double *z)
+static double sliding(const path *p, int k, crm_vec x, double alpha, double beta)
 {
-    memset(z, 0, 3 * (size_t)(s->nb + s->ng) * sizeof(double));
+    const crm_island *s = p->s;
+    return row_t(s, k, x.z) + alpha * s->contact[k].ct + beta * p->d.t[k] + COMPLIANCE * x.t[k];
+}
+
+/* What x misses of the equations of the modes, for data alpha c + beta d, into rhs. */
+static double find_defect(const path *p, crm_vec x, double alpha, double beta)
+{
+    crm_island *s = p->s;
+    double e = 0;
+    crm_island_defect(s, x, s->rhs.z);
     for (int q = 0; q < s->ng; q++) {
-        for (int r = 0; r < CRM_GROUP_ROWS; r++) z[3 * (s->nb + q) + r] = -s->group[q].c[r];
-    }
-    crm_island_solve(s, z);
-}
-
-/* Column of -M for an impulse along `row`, at column `to` with sign. */
-static void put_column(const crm_island *s, const crm_lemke_work *k, numbering o, const double *z,
-                       int to, double sign)
-{
-    const int n = k->n;
-    for (int i = 0; i < o.m; i++) {
-        const crm_contact *c = &s->contact[i];
-        row_of(k, i)[n + to] = -sign * crm_dot(c->n, c->a, c->b, z);
-    }
-    for (int q = 0; q < o.f; q++) {
-        const crm_contact *c = &s->contact[k->cone[q]];
-        const double u = sign * crm_dot(c->t, c->a, c->b, z);
-        row_of(k, o.m + q)[n + to] = -u;
-        row_of(k, o.m + o.f + q)[n + to] = u;
-    }
-}
-
-/* E, -E' and mu of (7). */
-static void put_cones(const crm_island *s, const crm_lemke_work *k, numbering o)
-{
-    const int n = k->n;
-    for (int q = 0; q < o.f; q++) {
-        const int plus = o.m + q;
-        const int minus = plus + o.f;
-        const int g = minus + o.f;
-        row_of(k, plus)[n + g] = -1;
-        row_of(k, minus)[n + g] = -1;
-        row_of(k, g)[n + k->cone[q]] = -s->contact[k->cone[q]].mu;
-        row_of(k, g)[n + plus] = 1;
-        row_of(k, g)[n + minus] = 1;
-    }
-}
-
-/* Tableau [I, -M, -d, q]. */
-static void fill(crm_island *s, crm_lemke_work *k, numbering o, double regular,
-                 unsigned long long seed)
-{
-    const int n = k->n;
-    double *z = s->step.z;
-    memset(k->tableau, 0, (size_t)n * (size_t)(2 * n + 2) * sizeof(double));
-    for (int i = 0; i < o.m; i++) {
-        response_of(s, s->contact[i].n, &s->contact[i], z);
-        put_column(s, k, o, z, i, 1);
-    }
-    for (int q = 0; q < o.f; q++) {
-        const crm_contact *c = &s->contact[k->cone[q]];
-        response_of(s, c->t, c, z);
-        put_column(s, k, o, z, o.m + q, 1);
-        put_column(s, k, o, z, o.m + o.f + q, -1);
-    }
-    put_cones(s, k, o);
-    joint_motion(s, z);
-    for (int i = 0; i < n; i++) {
-        double *row = row_of(k, i);
-        row[i] = 1;
-        if (i < o.m + 2 * o.f) row[n + i] -= regular;
-        k->covering[i] = seed ? 0.5 + 1.5 * crm_uniform(&seed) : 1;
-        row[2 * n] = -k->covering[i];
-        k->basis[i] = i;
-    }
-    for (int i = 0; i < o.m; i++) {
-        const crm_contact *c = &s->contact[i];
-        row_of(k, i)[2 * n + 1] = crm_dot(c->n, c->a, c->b, z) + c->cn;
-    }
-    for (int q = 0; q < o.f; q++) {
-        const crm_contact *c = &s->contact[k->cone[q]];
-        const double u = crm_dot(c->t, c->a, c->b, z) + c->ct;
-        row_of(k, o.m + q)[2 * n + 1] = u;
-        row_of(k, o.m + o.f + q)[2 * n + 1] = -u;
-    }
-}
-
-static void pivot(const crm_lemke_work *k, int row, int column)
-{
-    double *p = row_of(k, row);
-    const double scale = 1 / p[column];
-    for (int j = 0; j < 2 * k->n + 2; j++) p[j] *= scale;
-    for (int i = 0; i < k->n; i++) {
-        double *x = row_of(k, i);
-        const double f = x[column];
-        if (i == row || f == 0) continue; /* exact: nothing to eliminate */
-        for (int j = 0; j < 2 * k->n + 2; j++) x[j] -= f * p[j];
-    }
-}
-
-/* Row i precedes row `best` in the lexicographic ratio test; the covering variable goes first. */
-static int precedes(const crm_lemke_work *k, int column, int i, int best)
-{
-    const int n = k->n;
-    const double *x = row_of(k, i);
-    const double *y = row_of(k, best);
-    const double rx = fmax(x[2 * n + 1], 0) / x[column];
-    const double ry = fmax(y[2 * n + 1], 0) / y[column];
-    const double tie = TIE * (1 + fabs(ry));
-    if (rx < ry - tie) return 1;
-    if (rx > ry + tie) return 0;
-    if (k->basis[i] == 2 * n) return 1;
-    if (k->basis[best] == 2 * n) return 0;
-    for (int j = 0; j < n; j++) {
-        const double d = x[j] / x[column] - y[j] / y[column];
-        if (d < -LEX_TIE) return 1;
-        if (d > LEX_TIE) return 0;
-    }
-    return 0;
-}
-
-static int leaving_row(const crm_lemke_work *k, int column)
-{
-    int best = -1;
-    for (int i = 0; i < k->n; i++) {
-        if (!(row_of(k, i)[column] > PIVOT_MIN)) continue;
-        if (best < 0 || precedes(k, column, i, best)) best = i;
-    }
-    return best;
-}
-
-/* Row where the covering variable enters; -1 when q >= 0 already. */
-static int first_row(const crm_lemke_work *k)
-{
-    int row = -1;
-    double least = 0;
-    for (int i = 0; i < k->n; i++) {
-        const double ratio = row_of(k, i)[2 * k->n + 1] / k->covering[i];
-        if (ratio < least) {
-            least = ratio;
-            row = i;
+        for (int r = 0; r < CRM_GROUP_ROWS; r++) {
+            const int at = 3 * (s->nb + q) + r;
+            s->rhs.z[at] += s->group[q].c[r] * (1 - alpha) - beta * p->d.z[at];
+            s->rhs.z[at] -= COMPLIANCE * x.z[at];
         }
     }
-    return row;
+    for (int i = 0; i < 3 * (s->nb + s->ng); i++) e = fmax(e, fabs(s->rhs.z[i]));
+    for (int k = 0; k < s->nc; k++) {
+        const int active = s->mode[k] != CAROM_SEPARATED;
+        s->rhs.n[k] = active ? -opening(p, k, x, alpha, beta) : 0;
+        s->rhs.t[k] = sticks(s, k) ? -sliding(p, k, x, alpha, beta) : 0;
+        e = fmax(e, fmax(fabs(s->rhs.n[k]), fabs(s->rhs.t[k])));
+    }
+    return e;
 }
 
-/* Complementary pivots until the covering variable leaves.  0: ray, or too many pivots. */
-static int run(crm_lemke_work *k, int max_pivots)
+static double size_of(const crm_island *s, crm_vec x)
 {
-    const int n = k->n;
-    int column = 2 * n;
-    int row = first_row(k);
-    if (row < 0) return 1;
+    double m = 0;
+    for (int i = 0; i < 3 * s->nb; i++) m = fmax(m, fabs(x.z[i]));
+    return m;
+}
+
+/* Solves the equations of the modes, starting from x. */
+static void solve(path *p, crm_vec x, double alpha, double beta)
+{
+    crm_island *s = p->s;
+    for (int i = 0; i < PASSES; i++) {
+        if (find_defect(p, x, alpha, beta) <= DEFECT_DONE * (1 + size_of(s, x)) && i) return;
+        crm_island_reduce(s, s->rhs, s->step);
+        crm_vec_add(s, x, 1, s->step);
+    }
+}
+
+static void fit(const crm_island *s, crm_vec x)
+{
+    for (int k = 0; k < s->nc; k++) {
+        const double mu = s->contact[k].mu;
+        if (s->mode[k] == CAROM_SEPARATED) x.n[k] = x.t[k] = 0;
+        if (!(mu > 0)) x.t[k] = 0;
+        if (s->mode[k] > CAROM_STICK) x.t[k] = crm_slip_sign(s->mode[k]) * mu * x.n[k];
+    }
+}
+
+static void factor(path *p)
+{
+    crm_set_responses(p->s, COMPLIANCE);
+    crm_island_factor(p->s, 1, COMPLIANCE);
+}
+
+/* All contacts open, pushed apart at different speeds; what joints ask for is in the point. */
+static void begin(path *p, unsigned long long seed)
+{
+    crm_island *s = p->s;
+    memset(s->mode, CAROM_SEPARATED, (size_t)s->nc);
+    crm_vec_zero(s, s->x);
+    crm_vec_zero(s, p->d);
+    for (int k = 0; k < s->nc; k++) p->d.n[k] = 0.5 + crm_uniform(&seed);
+    p->tau = TAU_MAX;
+    p->direction = -1;
+}
+
+/* Conditions of contact k's mode, all >= 0: at a point (alpha = 1) or along the tangent (0). */
+static int conditions(const path *p, int k, crm_vec x, double alpha, double beta, double f[2])
+{
+    const crm_island *s = p->s;
+    const double mu = s->contact[k].mu;
+    switch (s->mode[k]) {
+    case CAROM_SEPARATED: f[0] = opening(p, k, x, alpha, beta); return 1;
+    case CAROM_STICK:
+        f[0] = mu > 0 ? mu * x.n[k] - x.t[k] : x.n[k];
+        f[1] = mu * x.n[k] + x.t[k];
+        return mu > 0 ? 2 : 1;
+    default:
+        f[0] = x.n[k];
+        f[1] = -crm_slip_sign(s->mode[k]) * sliding(p, k, x, alpha, beta);
+        return 2;
+    }
+}
+
+/* Mode on the other side of condition i of contact k; *now: index of the new mode's condition that
+ * starts from zero. */
+static unsigned char adjacent(const path *p, int k, int i, int *now)
+{
+    const crm_island *s = p->s;
+    const double mu = s->contact[k].mu;
+    *now = 0;
+    switch (s->mode[k]) {
+    case CAROM_SEPARATED:
+        if (!(mu > 0)) return CAROM_STICK;
+        return sliding(p, k, s->x, 1, p->tau) > 0 ? CAROM_SLIP_MINUS : CAROM_SLIP_PLUS;
+    case CAROM_STICK:
+        if (!(mu > 0)) return CAROM_SEPARATED;
+        *now = 1;
+        return i ? CAROM_SLIP_MINUS : CAROM_SLIP_PLUS;
+    default:
+        if (!i) return CAROM_SEPARATED;
+        *now = s->mode[k] == CAROM_SLIP_PLUS ? 0 : 1;
+        return CAROM_STICK;
+    }
+}
+
+/* Longest step along the tangent; the contact and condition that end it, or -1. */
+static double find_event(const path *p, int *contact, int *condition)
+{
+    const crm_island *s = p->s;
+    double step = p->direction < 0 ? p->tau : TAU_MAX - p->tau;
+    *contact = -1;
+    for (int k = 0; k < s->nc; k++) {
+        double f[2];
+        double g[2];
+        const int n = conditions(p, k, s->x, 1, p->tau, f);
+        conditions(p, k, p->tangent, 0, 1, g);
+        for (int i = 0; i < n; i++) {
+            const double slope = p->direction * g[i];
+            if (!(slope < -SLOPE_ZERO)) continue;
+            const double t = fmax(f[i], 0) / -slope;
+            if (t >= step) continue;
+            step = t;
+            *contact = k;
+            *condition = i;
+        }
+    }
+    return step;
+}
+
+/* Tangent on the present modes, and the direction in which condition `now` of contact k grows. */
+static int turn(path *p, int k, int now)
+{
+    double g[2];
+    crm_vec_zero(p->s, p->tangent);
+    solve(p, p->tangent, 0, 1);
+    fit(p->s, p->tangent);
+    if (k < 0) return 1;
+    conditions(p, k, p->tangent, 0, 1, g);
+    if (!(fabs(g[now]) > SLOPE_ZERO)) return 0;
+    p->direction = g[now] > 0 ? 1 : -1;
+    return 1;
+}
+
+int crm_lemke(crm_island *s, int max_pivots, unsigned long long seed)
+{
+    path p = {.s = s, .d = s->top, .tangent = s->way[0]};
+    begin(&p, seed);
+    int contact = -1;
+    int condition = 0;
+    int now = 0;
     for (int i = 0; i < max_pivots; i++) {
-        const int leaving = k->basis[row];
-        pivot(k, row, column);
-        k->basis[row] = column;
-        if (leaving == 2 * n) return 1;
-        column = leaving < n ? leaving + n : leaving - n;
-        row = leaving_row(k, column);
-        if (row < 0) return 0;
+        factor(&p);
+        if (i % REFRESH == 0) solve(&p, s->x, 1, p.tau);
+        fit(s, s->x);
+        if (!turn(&p, contact, now)) return 0;
+        const double step = find_event(&p, &contact, &condition);
+        if (!(step < HUGE_VAL)) return 0;
+        crm_vec_add(s, s->x, p.direction * step, p.tangent);
+        p.tau += p.direction * step;
+        if (contact < 0) return p.direction < 0;
+        s->mode[contact] = adjacent(&p, contact, condition, &now);
     }
     return 0;
-}
-
-/* Multipliers of the basis, and the motion that follows from them. */
-static void read_solution(crm_island *s, const crm_lemke_work *k, numbering o)
-{
-    const int n = k->n;
-    crm_vec_zero(s, s->x);
-    for (int i = 0; i < n; i++) {
-        const int v = k->basis[i] - n;
-        if (v < 0 || v >= n) continue;
-        const double value = row_of(k, i)[2 * n + 1];
-        if (v < o.m)
-            s->x.n[v] = value;
-        else if (v < o.m + o.f)
-            s->x.t[k->cone[v - o.m]] += value;
-        else if (v < o.m + 2 * o.f)
-            s->x.t[k->cone[v - o.m - o.f]] -= value;
-    }
-    crm_island_defect(s, s->x, s->x.z); /* z = 0 on entry: J' l, -c_e */
-    crm_island_solve(s, s->x.z);
-    crm_modes_at(s);
-}
-
-int crm_lemke(crm_island *s, double regular, unsigned long long seed, crm_lemke_work *k)
-{
-    numbering o = {.m = s->nc, .f = 0};
-    for (int i = 0; i < s->nc; i++) {
-        if (s->contact[i].mu > 0) k->cone[o.f++] = i;
-    }
-    no_responses(s);
-    fill(s, k, o, regular, seed);
-    if (!run(k, 20 * s->nc + 50)) return 0;
-    read_solution(s, k, o);
-    return 1;
 }

@@ -11,7 +11,6 @@ struct carom_contact_solver {
     crm_block_pattern pattern;
     int pattern_valid;
     crm_system system;
-    crm_arena lemke;
     double *scratch; /* solve: 6 per body; adjoint: see adjoint.c */
     int scratch_max;
     double *certificate; /* y_n, then y_e */

@@ -209,6 +209,7 @@ static void set_vectors(crm_island *s, const crm_system *y, int block, int conta
     s->step = slice(&y->vec[5], block, contact);
     s->way[0] = slice(&y->vec[6], block, contact);
     s->way[1] = slice(&y->vec[7], block, contact);
+    s->swept = slice(&y->vec[8], block, contact);
 }
 
 static crm_block_lu lu_view(const crm_system *y, const crm_block_pattern *s, int first, int n)
