@@ -17,7 +17,7 @@ from carom.messages import (
 
 
 class Bus:
-    """A server of the rules of docs/daemon.md, a clock, and a network that loses messages."""
+    """A server of the rules of docs/protocol.md, a clock, and a network that loses messages."""
 
     def __init__(self, loss=0.0, seed=1):
         self.now = 0.0
