@@ -98,9 +98,17 @@ static int certifies(crm_island *s, double f)
     return sqrt(force) < CERTIFICATE * 2 * f;
 }
 
+/* Bodies at rest, w = -u / (V sqrt(W)), satisfy everything to rounding, as without restitution. */
+static int rest_is_feasible(crm_island *s)
+{
+    for (int i = 0; i < 3 * s->nb; i++) s->x.z[i] = -s->free[i];
+    return sqrt(2 * find_violation(s)) <= VIOLATION;
+}
+
 int crm_farkas(crm_island *s)
 {
-    crm_vec_zero(s, s->x);
+    if (rest_is_feasible(s)) return 0;
+    crm_vec_copy(s, s->x, s->best);
     for (int i = 0; i < MAX_PASSES; i++) {
         crm_vec_copy(s, s->top, s->x);
         for (int k = 0; k < MAX_NEWTON; k++) {
