@@ -370,9 +370,14 @@ static void check_array(run *r, const carom_world *w, const whole *x, int a)
             continue;
         }
         r->entry = k;
+        /* Rounding asks for a long step, kinks for a short one: the best of three. */
         double best = fdiff(loss, r, r->s->step, &error);
-        if (fabs(best - x->array[a][k]) > DIFFERENCE_TOL * largest) {
-            best = fdiff(loss, r, r->s->step / 16, &error);
+        for (int i = 0; i < 2; i++) {
+            double other_error;
+            if (fabs(best - x->array[a][k]) <= DIFFERENCE_TOL * largest) break;
+            const double other = fdiff(loss, r, r->s->step * (i ? 0.0625 : 32), &other_error);
+            if (other_error < error) best = other;
+            error = fmin(error, other_error);
         }
         if (fabs(best - x->array[a][k]) > DIFFERENCE_TOL * largest) {
             fail_msg("%s: d/d %s[%d] = %.12g, differences %.12g (+- %.2g), largest %.3g",
@@ -400,7 +405,15 @@ static void check_scene(const scene *s)
 
 static void against_differences(void **state)
 {
+    scene_integrator = CAROM_EULER;
     check_scene(*state);
+}
+
+static void located_against_differences(void **state)
+{
+    scene_integrator = CAROM_LOCATED;
+    check_scene(*state);
+    scene_integrator = CAROM_EULER;
 }
 
 /* --- closed forms ------------------------------------------------------------------------------
@@ -429,6 +442,7 @@ static void sliding_friction_sign(void **state)
 {
     (void)state;
     const double h = 1.0 / 30;
+    scene_integrator = CAROM_EULER;
     carom_world *w = scene_world(50, h);
     scene_floor(w, 0.25, 0);
     const int b = scene_box(w, 1, 0.5, 0.25, at(0, 0.25, 0), 0.25, 0);
@@ -504,6 +518,7 @@ static void free_flight(void **state)
 {
     (void)state;
     const double h = 0.1;
+    scene_integrator = CAROM_EULER;
     carom_world *w = scene_world(9.81, h);
     const int b = scene_disc(w, 2, 0.2, 0, 0, 0, 0);
     w->force[3 * b + 1] = 3;
@@ -522,17 +537,17 @@ static void free_flight(void **state)
 
 int main(void)
 {
-    struct CMUnitTest tests[N_SCENES + 5];
+    struct CMUnitTest tests[2 * N_SCENES + 5];
     memset(tests, 0, sizeof tests);
-    for (int k = 0; k < N_SCENES; k++) {
-        tests[k].name = SCENES[k].name;
-        tests[k].test_func = against_differences;
-        tests[k].initial_state = (void *)(size_t)&SCENES[k];
+    for (int k = 0; k < 2 * N_SCENES; k++) {
+        tests[k].name = SCENES[k % N_SCENES].name;
+        tests[k].test_func = k < N_SCENES ? against_differences : located_against_differences;
+        tests[k].initial_state = (void *)(size_t)&SCENES[k % N_SCENES];
     }
     const struct CMUnitTest closed[5] = {cmocka_unit_test(sliding_friction_sign),
                                          cmocka_unit_test(wall_bounce),
                                          cmocka_unit_test(bounce_on_a_border),
                                          cmocka_unit_test(head_on), cmocka_unit_test(free_flight)};
-    memcpy(tests + N_SCENES, closed, sizeof closed);
+    memcpy(tests + 2 * N_SCENES, closed, sizeof closed);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

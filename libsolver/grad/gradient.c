@@ -21,8 +21,9 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
     const size_t k3 = 3 * (size_t)r->world->n_moving;
     const size_t rows = 2 * (size_t)r->world->n_joints;
-    double **const full[5] = {&r->q_bar, &r->v_bar, &r->q_seed, &r->v_seed, &r->q_event};
-    for (int k = 0; k < 5; k++) *full[k] = crm_carve(b, n3, sizeof(double));
+    double **const full[8] = {&r->q_bar,   &r->v_bar,     &r->q_seed, &r->v_seed,
+                              &r->q_event, &r->solve_bar, &r->pose,   &r->pose_bar};
+    for (int k = 0; k < 8; k++) *full[k] = crm_carve(b, n3, sizeof(double));
     r->velocity_bar = crm_carve(b, k3, sizeof(double));
     r->bars.u = crm_carve(b, k3, sizeof(double));
     r->bars.inv_mass = crm_carve(b, k3, sizeof(double));
@@ -31,9 +32,10 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     r->bars.mu = crm_carve(b, m, sizeof(double));
     r->bars.cn = crm_carve(b, m, sizeof(double));
     r->bars.je = crm_carve(b, 6 * rows, sizeof(double));
+    r->bars.ct = crm_carve(b, m, sizeof(double));
     r->bars.ce = crm_carve(b, rows, sizeof(double));
     r->moved = crm_carve(b, m, sizeof *r->moved);
-    r->moved_lt = crm_carve(b, m, sizeof(double));
+    r->gap_bar = crm_carve(b, m, sizeof(double));
 }
 
 static carom_status allocate(crm_reverse *r)
@@ -141,7 +143,8 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
     switch (s.end) {
     case CRM_END_FRAME: *left_bar = h_bar; break;
     case CRM_END_FRACTION: *left_bar = s.fraction * h_bar + (1 - s.fraction) * *left_bar; break;
-    case CRM_END_EVENT: break; /* left_before = left_after + h*, and h* is in k */
+    case CRM_END_IMPACT: break; /* no time passes */
+    case CRM_END_EVENT: break;  /* left_before = left_after + h*, and h* is in k */
     }
     return CAROM_OK;
 }

@@ -45,9 +45,12 @@ typedef struct crm_reverse {
     double *q_seed, *v_seed;
     double *q_event;      /* 3 n_bodies: d gap / d q1 */
     double *velocity_bar; /* 3 n_moving */
+    double *gap_bar;      /* per contact */
     carom_contact_bars bars;
-    crm_contact *moved; /* contacts at the pose of a correction */
-    double *moved_lt;
+    double *solve_bar;  /* 3 n_bodies: cotangent of the velocity of the solve under way */
+    double *pose;       /* 3 n_bodies: end of an iteration of stage 1 */
+    double *pose_bar;   /* 3 n_bodies: its cotangent */
+    crm_contact *moved; /* contacts at the pose of the problem under way */
     void *block;
     size_t bytes;
     carom_gradient_stats stats;
@@ -61,8 +64,38 @@ void crm_geometry_vjp(crm_reverse *r, const double *q, const crm_contact *c,
 void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double je_bar[12],
                    const double *error_bar, double *q_bar, int with_parameters);
 
-/* reverse.c: from (q_bar, v_bar) at the end of a sub-step to its start, in place; adds to the sink
- * when with_parameters; *h_bar is the cotangent of h. */
+void crm_slip_vjp(crm_reverse *r, const crm_contact *c, const double *q0, const double *q1,
+                  double slip_bar, double *q0_bar, double *q1_bar, int with_parameters);
+
+/* solve.c: the adjoint of one solve. */
+/* Reverse derivative of solve c with the cotangent v_bar of its velocity: fills r->bars.  Masses go
+ * to the sink with with_parameters, except what u depends on them. */
+carom_status crm_solve_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, const double *v_bar);
+/* u = v + h (W f + g): u_bar to v_bar, h_bar (times share = dh / dstep), forces, gravity, masses.
+ */
+void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, double h, double share,
+                           double *v_bar, double *h_bar, int with_parameters);
+/* q1 = q0 + h v: v_bar += h q_bar, *h_bar += q_bar . v. */
+void crm_move_vjp(const carom_world *w, const crm_substep *s, const double *v, const double *q_bar,
+                  double *v_bar, double *h_bar);
+/* Inverse masses in r->bars to mass and inertia. */
+void crm_mass_vjp(crm_reverse *r);
+/* Rows in r->bars, and gaps and joint errors when given, at q of solve c, to q_bar and parameters.
+ */
+void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, const double *gap_bar,
+                  const double *error_bar, double *q_bar, int with_parameters);
+/* c_n = e u_n with u_n = J_n v, or gap / h ahead: adds to v_bar, rows, gap_bar, h_bar. */
+void crm_targets_vjp(crm_reverse *r, const crm_substep *s, const double *v, double *v_bar,
+                     double *gap_bar, double *h_bar, int with_parameters);
+
+/* The maps, from (q_bar, v_bar) at the end of a sub-step to its start, in place; parameters go to
+ * the sink when with_parameters; *h_bar is the cotangent of h. */
+carom_status crm_euler_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
+                           int with_parameters, double *h_bar);
+carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
+                            int with_parameters, double *h_bar);
+carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
+                            int with_parameters);
 carom_status crm_substep_vjp(crm_reverse *r, const crm_substep *s, double *q_bar, double *v_bar,
                              int with_parameters, double *h_bar);
 #endif

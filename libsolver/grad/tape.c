@@ -14,33 +14,43 @@ static void *keep(crm_block *b, const void *from, size_t n, size_t size)
     return to;
 }
 
+/* Which rows a kind of solve needs its own right-hand sides of. */
+static void keep_solve(const carom_tape *t, const crm_substep *s, int index, crm_block *b,
+                       crm_solve *to)
+{
+    const crm_solve *c = &s->solve[index];
+    const size_t m = (size_t)s->n_contacts;
+    const size_t rows = 2 * (size_t)t->world->n_joints;
+    const int first_pose = c->kind == CRM_CORRECTION || c->kind == CRM_STAGE_2;
+    to->q = first_pose ? keep(b, c->q, n3(t), sizeof(double)) : NULL;
+    to->v = keep(b, c->v, n3(t), sizeof(double));
+    to->cn = keep(b, c->cn, m, sizeof(double));
+    to->ct = keep(b, c->ct, m, sizeof(double));
+    to->ln = keep(b, c->ln, m, sizeof(double));
+    to->lt = keep(b, c->lt, m, sizeof(double));
+    to->mode = keep(b, c->mode, m, 1);
+    to->ce = keep(b, c->ce, rows, sizeof(double));
+    to->le = keep(b, c->le, rows, sizeof(double));
+}
+
 /* Copies what the reverse pass needs of a sub-step into a block; measures when b->base is NULL. */
 static void pack(const carom_tape *t, const crm_substep *s, crm_block *b, crm_substep *to)
 {
     const size_t m = (size_t)s->n_contacts;
-    const size_t rows = 2 * (size_t)t->world->n_joints;
     *to = *s;
     to->moved = NULL;
-    to->moved_lt = NULL;
+    to->pressing = NULL;
     to->state_block = NULL;
     to->contact_block = NULL;
     to->q0 = keep(b, s->q0, n3(t), sizeof(double));
     to->v0 = keep(b, s->v0, n3(t), sizeof(double));
     to->q1 = NULL;
     to->v1 = NULL;
-    to->le = keep(b, s->le, rows, sizeof(double));
     to->contacts = keep(b, s->contacts, m, sizeof *s->contacts);
-    to->ln = keep(b, s->ln, m, sizeof(double));
-    to->lt = keep(b, s->lt, m, sizeof(double));
-    to->cn = keep(b, s->cn, m, sizeof(double));
-    to->mode = keep(b, s->mode, m, 1);
-    to->pressing = keep(b, s->pressing, m, 1);
-    for (int k = 0; k < s->n_projections; k++) {
-        const crm_projection *p = &s->projection[k];
-        to->projection[k].q = keep(b, p->q, n3(t), sizeof(double));
-        to->projection[k].le = keep(b, p->le, rows, sizeof(double));
-        to->projection[k].ln = keep(b, p->ln, m, sizeof(double));
-        to->projection[k].mode = keep(b, p->mode, m, 1);
+    to->target = keep(b, s->target, m, sizeof(double));
+    for (int k = 0; k < s->n_solves; k++) {
+        keep_solve(t, s, k, b, &to->solve[k]);
+        if (!to->solve[k].q) to->solve[k].q = to->q0;
     }
 }
 

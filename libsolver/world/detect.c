@@ -100,7 +100,17 @@ double crm_distance_between(const carom_world *w, carom_pair pair, const double 
         .distance;
 }
 
-crm_contact crm_contact_of(const carom_world *w, carom_pair pair, const carom_manifold *m, int k)
+/* The end of the reference edge as a vertex against the incident edge. */
+static carom_recipe unclip(const carom_world *w, carom_pair pair, carom_recipe r)
+{
+    const carom_shape *ref = &w->shapes[r.flipped ? pair.b : pair.a].view;
+    carom_recipe v = {r.inc, r.ref, CAROM_EDGE_VERTEX, !r.flipped, 0};
+    if (r.at_end) v.inc = (r.ref + 1) % ref->count;
+    return v;
+}
+
+crm_contact crm_contact_of(const carom_world *w, carom_pair pair, const carom_manifold *m, int k,
+                           const double *q)
 {
     crm_contact c = {0};
     c.shape_a = pair.a;
@@ -112,18 +122,22 @@ crm_contact crm_contact_of(const carom_world *w, carom_pair pair, const carom_ma
     c.arm_a = m->points[k].arm_a;
     c.arm_b = m->points[k].arm_b;
     c.gap = m->points[k].gap;
+    if (c.recipe.kernel == CAROM_EDGE_CLIPPED) {
+        c.recipe = unclip(w, pair, c.recipe);
+        crm_contact_refresh(w, q, &c);
+    }
     return c;
 }
 
 static carom_status add_contacts(carom_world *w, carom_pair pair, const carom_manifold *m,
-                                 double margin)
+                                 const double *q, double margin)
 {
     crm_substep *s = &w->sub;
     const carom_status e = crm_substep_reserve(w, s, s->n_contacts + m->count);
     if (e) return e;
     for (int k = 0; k < m->count; k++) {
         crm_contact *c = &s->contacts[s->n_contacts++];
-        *c = crm_contact_of(w, pair, m, k);
+        *c = crm_contact_of(w, pair, m, k, q);
         c->speculative = c->gap > margin;
     }
     return crm_rows_reserve(w, s->n_contacts);
@@ -138,7 +152,7 @@ carom_status crm_detect(carom_world *w, const double *q, double margin)
     for (int k = 0; e >= 0 && k < n; k++) {
         if (!crm_may_collide(w, pairs[k])) continue;
         const carom_manifold m = crm_collide(w, pairs[k], q, margin);
-        if (m.count) e = add_contacts(w, pairs[k], &m, margin);
+        if (m.count) e = add_contacts(w, pairs[k], &m, q, margin);
     }
     return e;
 }
@@ -164,7 +178,7 @@ carom_status crm_detect_ahead(carom_world *w, const double *q, const double *v, 
         if (!crm_may_collide(w, pairs[k])) continue;
         const double reach = travel(w, pairs[k].a, v, h) + travel(w, pairs[k].b, v, h);
         const carom_manifold m = crm_collide(w, pairs[k], q, margin + reach);
-        if (m.count) e = add_contacts(w, pairs[k], &m, margin);
+        if (m.count) e = add_contacts(w, pairs[k], &m, q, margin);
     }
     return e;
 }

@@ -7,9 +7,13 @@
 #include "carom/collide.h"
 #include "carom/world.h"
 
-/* Newton corrections of the position constraints after a sub-step, at most: the error is squared by
- * each, so that four reach rounding level from 1e-2. */
-#define CRM_MAX_PROJECTIONS 4
+/* Corrections after an Euler step: four reach rounding level from 1e-2. */
+#define CRM_MAX_CORRECTIONS 4
+#define CRM_MAX_SOLVES      (1 + CRM_MAX_CORRECTIONS)
+/* A pair whose gap is below this touches [L]. */
+#define CRM_HIT_TOL 1e-12
+/* Approach below this is rest [fastest point of the world]. */
+#define CRM_REST_TOL 1e-9
 
 typedef struct crm_body {
     carom_body_type type;
@@ -53,21 +57,41 @@ typedef struct crm_contact {
 typedef enum crm_end {
     CRM_END_FRAME,    /* h is all the time that was left */
     CRM_END_FRACTION, /* h = fraction * left, fraction constant */
+    CRM_END_IMPACT,   /* no time passes */
     CRM_END_EVENT     /* h is the root of the gap of `event` */
 } crm_end;
 
-/* One position correction q + d: the frictionless problem at q with c_n = gap, c_e = joint error.
- */
-typedef struct crm_projection {
-    double *q;           /* 3 n_bodies: before */
+/* One contact problem of a sub-step and its solution; docs/step.md.  Row data not used by a kind
+ * are zero.  Of a correction the multipliers are those of d = W (Jn' ln + Je' le): what is added to
+ * the step's own. */
+typedef enum crm_solve_kind {
+    CRM_VELOCITY,   /* Euler: v1 from rows at q0 */
+    CRM_CORRECTION, /* Euler: displacement v from rows at q, frictionless */
+    CRM_IMPACT,     /* v1 from v0, no time passes */
+    CRM_STAGE_1, /* smooth: velocity over the sub-step, rows at q0, right-hand sides at its end */
+    CRM_STAGE_2  /* smooth: v1 from rows at q1 */
+} crm_solve_kind;
+
+typedef struct crm_solve {
+    crm_solve_kind kind;
+    double *q;           /* 3 n_bodies: where the rows are */
+    double *v;           /* 3 n_bodies: the solution, zero for static bodies */
+    double *cn;          /* per contact */
+    double *ct;          /* per contact */
     double *ln;          /* per contact */
+    double *lt;          /* per contact */
+    double *ce;          /* per joint row */
     double *le;          /* per joint row */
     unsigned char *mode; /* per contact */
-} crm_projection;
+} crm_solve;
+
+/* The maps that a sub-step can be. */
+typedef enum crm_map { CRM_MAP_EULER, CRM_MAP_SMOOTH, CRM_MAP_IMPACT } crm_map;
 
 /* Everything about one sub-step: what the reverse pass needs, no more. */
 typedef struct crm_substep {
-    double h;            /* [s] */
+    crm_map map;
+    double h;            /* [s], 0 for an impact */
     double *q0, *v0;     /* 3 n_bodies */
     double *q1, *v1;     /* 3 n_bodies */
     const double *force; /* 3 n_bodies: (torque, fx, fy) of the step */
@@ -75,16 +99,12 @@ typedef struct crm_substep {
     int n_contacts;
     int max_contacts;
     crm_contact *contacts;   /* geometry at q0 */
-    crm_contact *moved;      /* the same contacts at the pose of the latest correction */
-    double *moved_lt;        /* zeros: corrections have no friction */
-    double *ln, *lt;         /* per contact */
-    double *cn;              /* per contact: restitution or speculative gap / h */
-    unsigned char *mode;     /* per contact */
+    crm_contact *moved;      /* the same contacts at the pose of the problem under way */
     unsigned char *pressing; /* per contact: closed by force, so held at gap 0 from both sides */
-    double *le;              /* per joint row */
+    double *target;          /* per contact: gap that stage 1 aims at [m] */
     double restitution;      /* factor on all restitutions: 1, or 0 when relaxed */
-    int n_projections;
-    crm_projection projection[CRM_MAX_PROJECTIONS];
+    int n_solves;
+    crm_solve solve[CRM_MAX_SOLVES];
     crm_end end;
     double fraction;
     crm_contact event; /* the contact that closes at q1 */
@@ -98,10 +118,11 @@ typedef struct crm_substep {
 typedef struct crm_rows {
     int max_contacts;
     int *contact_body;
-    double *jn, *jt, *mu, *cn;
-    double *zero; /* max_contacts zeros: friction of projections */
+    double *jn, *jt, *mu;
+    double *zero; /* max_contacts zeros: friction of corrections */
     int *joint_body;
-    double *je, *ce;
+    double *je;
+    double *error;    /* per joint row: position error at the pose of the rows [m] */
     double *u;        /* 3 n_moving */
     double *v;        /* 3 n_moving: solution */
     double *inv_mass; /* 3 n_moving */
@@ -148,6 +169,7 @@ struct carom_world {
     int sealed;
     int n_moving;
     double length;     /* L [m] */
+    double speed;      /* sqrt(g L) [m/s] */
     double rest_speed; /* v_rest [m/s] */
     void *seal_block;  /* the arrays made by seal */
     size_t seal_bytes;
@@ -209,7 +231,10 @@ carom_manifold crm_collide(const carom_world *w, carom_pair pair, const double *
 /* Signed distance of the pair at q0 + at (q1 - q0). */
 double crm_distance_between(const carom_world *w, carom_pair pair, const double *q0,
                             const double *q1, double at);
-crm_contact crm_contact_of(const carom_world *w, carom_pair pair, const carom_manifold *m, int k);
+/* Point k of a manifold found at q.  A clipped point becomes what it is to the dynamics: the end of
+ * the reference edge, a vertex, against the incident edge. */
+crm_contact crm_contact_of(const carom_world *w, carom_pair pair, const carom_manifold *m, int k,
+                           const double *q);
 /* Geometry of the contact's recipe at q. */
 void crm_contact_refresh(const carom_world *w, const double *q, crm_contact *c);
 int crm_recipe_same(carom_recipe a, carom_recipe b);
@@ -225,12 +250,17 @@ double crm_row_dot(const double row[6], const double *v, int body_a, int body_b)
 void crm_contact_rows(const crm_contact *c, double jn[6], double jt[6]);
 /* Rows of J_e (2 x 6), equations.md (1), and the position error [m]. */
 void crm_joint_rows(const crm_joint *j, const double *q, double je[12], double error[2]);
-/* Problem of the velocity update: u = v0 + h (W f + g), rows of sub.contacts at q0. */
-carom_contact_problem crm_velocity_problem(carom_world *w, crm_substep *s);
-/* Problem of a position correction at q, contacts refreshed there, docs/step.md; *violation [m] is
- * the largest overlap, gap of a pressing contact or joint error. */
-carom_contact_problem crm_position_problem(carom_world *w, crm_substep *s, const double *q,
-                                           double *violation);
+/* Rows of all contacts and joints at q into w->rows, joint errors, inverse masses; sub.moved. */
+void crm_rows_at(carom_world *w, crm_substep *s, const double *q);
+/* rows.u = v + h (W f + g). */
+void crm_free_velocity(carom_world *w, const crm_substep *s, const double *v, double h);
+/* The problem of the rows in place with the right-hand sides of one solve. */
+carom_contact_problem crm_problem(carom_world *w, const crm_substep *s, const crm_solve *c);
+/* c->cn: restitution e u_n of an approach of v faster than v_rest, equations.md (3); gap / h for
+ * speculative contacts. */
+void crm_velocity_targets(carom_world *w, const crm_substep *s, const double *v, crm_solve *c);
+/* w->rows and rows.u of a solve of this sub-step, from recorded states alone. */
+carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const crm_solve *c);
 /* Largest joint error at q [m]. */
 double crm_joint_drift(const carom_world *w, const double *q);
 
@@ -242,15 +272,49 @@ carom_status crm_rows_create(carom_world *w);
 carom_status crm_rows_reserve(carom_world *w, int n_contacts);
 void crm_rows_free(carom_world *w);
 
-/* euler.c: the map S(h) from (q0, v0) of w->sub to (q1, v1). */
-carom_status crm_euler(carom_world *w, double h);
+/* solve.c */
+/* Solves c, whose right-hand sides and pose are set; the result and modes go to c. */
+carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use_guess);
+/* The same for a problem with restitution; where that leaves no solution, without. */
+carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, const double *v);
+/* q += scale v for moving bodies. */
+void crm_move(const carom_world *w, double *q, const double *v, double scale);
 /* Rounding error of a position difference, from the farthest body [m]. */
 double crm_rounding(const carom_world *w);
-/* Modes of sub.contacts from the last accepted sub-step. */
+/* Modes of sub.solve[0] from the last accepted sub-step. */
 void crm_guess_load(carom_world *w);
 carom_status crm_guess_save(carom_world *w);
+
+/* The maps: from (q0, v0) of w->sub to (q1, v1). */
+carom_status crm_euler(carom_world *w, double h);  /* euler.c */
+carom_status crm_smooth(carom_world *w, double h); /* smooth.c */
+carom_status crm_impact(carom_world *w);           /* smooth.c */
+/* euler.c or smooth.c by the world's integrator. */
+carom_status crm_map_run(carom_world *w, double h);
 /* Corrects sub.q1 until no contact of sub overlaps and no joint drifts. */
 carom_status crm_project(carom_world *w, crm_substep *s);
+
+/* smooth.c: whether a contact of sub is hit now; keeps of sub.contacts those of the impact, or
+ * those that stay closed in smooth motion. */
+int crm_select_impact(carom_world *w);
+void crm_select_contacts(carom_world *w, int for_impact);
+
+/* A vertex v of the point body, rounded by radius, on the face a-b (unit tangent t, face frame). */
+typedef struct crm_slide {
+    int face_shape, point_shape;
+    int face_body, point_body;
+    carom_vec2 a, b, t, v;
+    double radius;
+} crm_slide;
+crm_slide crm_slide_of(const carom_world *w, const crm_contact *c);
+/* The vertex in the frame of the face's body. */
+carom_vec2 crm_slide_point(const crm_slide *s, const double *q);
+
+/* From the round vertex of A to that of B. */
+carom_vec2 crm_centers(const carom_world *w, const crm_contact *c, const double *q);
+
+/* slip.c: arc length that body B slips on body A along the tangent of a contact, from q0 to q1. */
+double crm_slip(const carom_world *w, const crm_contact *c, const double *q0, const double *q1);
 
 /* locate.c: S(left), or S of a fraction of it when that has no solution. */
 carom_status crm_run_through(carom_world *w, double left);

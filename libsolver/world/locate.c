@@ -6,8 +6,6 @@
 
 /* The root of a gap is found to this [L]; rounding of far coordinates is added. */
 static const double ROOT_TOL = 1e-13;
-/* A pair that closes at the very end of the sub-step: gap up to this [L]. */
-static const double HIT_TOL = 1e-12;
 /* Illinois steps for one root, rounds over several roots, halvings of a failed sub-step. */
 enum { MAX_ROOT_STEPS = 60, MAX_ROUNDS = 20, MAX_HALVINGS = 4, MAX_SAMPLES = 64 };
 
@@ -17,7 +15,8 @@ typedef struct watch {
     carom_pair pair;
     int by_recipe;
     carom_recipe recipe;
-    double g0;   /* at q0, > 0 */
+    int opened;  /* 1: touching at q0 and opening; g is then gap / h, which has no root at h = 0 */
+    double g0;   /* at q0, > 0; of an opened pair its speed */
     double g1;   /* at q1 */
     double at;   /* fraction of the sub-step where g1 was found: 1, or less after a tunnel */
     int touches; /* 1: closes exactly at the end rather than overlaps */
@@ -34,6 +33,35 @@ static double watch_gap(const carom_world *w, const watch *x, const double *q)
     c.recipe = x->recipe;
     crm_contact_refresh(w, q, &c);
     return c.gap;
+}
+
+/* What is located: the gap, or gap / h of a pair that opened at h = 0. */
+static double watch_value(const carom_world *w, const watch *x, const double *q, double h)
+{
+    const double gap = watch_gap(w, x, q);
+    return x->opened ? gap / h : gap;
+}
+
+/* Fills g0 from q0: the gap, or where that is closed the speed at which it opens. */
+static void watch_start(const carom_world *w, watch *x)
+{
+    const crm_substep *s = &w->sub;
+    const double slop = w->settings.margin * w->length;
+    x->g0 = watch_gap(w, x, s->q0);
+    if (x->g0 > slop) return;
+    const carom_manifold m = crm_collide(w, x->pair, s->q0, slop);
+    x->opened = 1;
+    x->g0 = HUGE_VAL;
+    for (int k = 0; k < m.count; k++) {
+        double jn[6];
+        double jt[6];
+        const crm_contact c = crm_contact_of(w, x->pair, &m, k, s->q0);
+        if (x->by_recipe && !crm_recipe_same(c.recipe, x->recipe)) continue;
+        crm_contact_rows(&c, jn, jt);
+        x->g0 = fmin(x->g0, crm_row_dot(jn, s->v0, c.body_a, c.body_b));
+    }
+    if (!(x->g0 < HUGE_VAL)) x->g0 = 0;
+    x->g1 /= s->h * x->at;
 }
 
 /* Of two watched gaps the one whose straight line meets zero first. */
@@ -53,11 +81,14 @@ typedef struct search {
     watch best;
 } search;
 
+/* x->g1 is the gap at x->at. */
 static void consider(search *f, const watch *x)
 {
-    if (!(x->g0 > 0) || x->g1 > f->hit) return;
+    if (x->g1 > f->hit) return;
     watch y = *x;
     y.touches = x->g1 >= -f->tol;
+    watch_start(f->w, &y);
+    if (!(y.g0 > 0) || (y.touches && y.opened)) return;
     if (!f->any || earlier(&y, &f->best)) f->best = y;
     f->any = 1;
 }
@@ -91,10 +122,10 @@ static void consider_features(search *f, carom_pair pair, int k)
     const crm_substep *s = &f->w->sub;
     const carom_manifold m = crm_collide(f->w, pair, s->q1, f->hit);
     for (int i = 0; i < m.count; i++) {
-        if (held_recipe(s, k, pair, m.points[i].recipe)) continue;
-        watch x = {pair, 1, m.points[i].recipe, 0, m.points[i].gap, 1, 0};
-        x.g0 = watch_gap(f->w, &x, s->q0);
-        if (x.g0 > f->w->settings.margin * f->w->length) consider(f, &x);
+        const crm_contact c = crm_contact_of(f->w, pair, &m, i, s->q1);
+        if (held_recipe(s, k, pair, c.recipe)) continue;
+        const watch x = {pair, 1, c.recipe, 0, 0, c.gap, 1, 0};
+        consider(f, &x);
     }
 }
 
@@ -119,21 +150,19 @@ static int samples(const carom_world *w, carom_pair pair)
 static void consider_pair(search *f, carom_pair pair)
 {
     const crm_substep *s = &f->w->sub;
-    watch x = {pair, 0, {0}, 0, 0, 1, 0};
+    watch x = {pair, 0, {0}, 0, 0, 0, 1, 0};
     const int n = samples(f->w, pair);
     for (int i = 1; i < n; i++) {
         const double at = (double)i / n;
         x.g1 = crm_distance_between(f->w, pair, s->q0, s->q1, at);
         if (x.g1 >= -f->tol) continue;
         x.at = at;
-        x.g0 = watch_gap(f->w, &x, s->q0);
         consider(f, &x);
         return;
     }
     const carom_manifold m = crm_collide(f->w, pair, s->q1, f->hit);
     if (!m.count) return;
     x.g1 = m.distance;
-    x.g0 = watch_gap(f->w, &x, s->q0);
     consider(f, &x);
 }
 
@@ -143,9 +172,9 @@ static carom_status first_closed(carom_world *w, watch *found, int *any)
     const double noise = crm_rounding(w);
     search f = {w,
                 w->settings.penetration * w->length + noise,
-                HIT_TOL * w->length + noise,
+                CRM_HIT_TOL * w->length + noise,
                 0,
-                {{0, 0}, 0, {0}, 0, 0, 1, 0}};
+                {{0, 0}, 0, {0}, 0, 0, 0, 1, 0}};
     int n;
     int cursor = 0;
     const carom_pair *pairs;
@@ -178,11 +207,11 @@ static carom_status find_root(carom_world *w, const watch *x, double *h)
     int side = 0;
     for (int i = 0; i < MAX_ROOT_STEPS; i++) {
         const double t = i < MAX_ROOT_STEPS / 2 ? (a * gb - b * ga) / (gb - ga) : 0.5 * (a + b);
-        const carom_status e = crm_euler(w, t);
+        const carom_status e = crm_map_run(w, t);
         if (e < 0) return e;
         *h = t;
-        const double g = watch_gap(w, x, w->sub.q1);
-        if (fabs(g) <= tol || b - a <= 1e-16 * b) return CAROM_OK;
+        const double g = watch_value(w, x, w->sub.q1, t);
+        if (fabs(x->opened ? g * t : g) <= tol || b - a <= 1e-16 * b) return CAROM_OK;
         if (g > 0) {
             a = t;
             ga = g;
@@ -202,15 +231,16 @@ static carom_status find_root(carom_world *w, const watch *x, double *h)
 static int set_event(carom_world *w, const watch *x)
 {
     crm_substep *s = &w->sub;
-    const double near = HIT_TOL * w->length + 4 * crm_rounding(w);
+    const double near = CRM_HIT_TOL * w->length + 4 * crm_rounding(w);
     const carom_manifold m = crm_collide(w, x->pair, s->q1, x->by_recipe ? HUGE_VAL : near);
     int best = -1;
     for (int k = 0; k < m.count; k++) {
-        if (x->by_recipe && !crm_recipe_same(m.points[k].recipe, x->recipe)) continue;
+        const crm_contact c = crm_contact_of(w, x->pair, &m, k, s->q1);
+        if (x->by_recipe && !crm_recipe_same(c.recipe, x->recipe)) continue;
         if (best < 0 || m.points[k].gap < m.points[best].gap) best = k;
     }
     if (best < 0) return 0;
-    s->event = crm_contact_of(w, x->pair, &m, best);
+    s->event = crm_contact_of(w, x->pair, &m, best, s->q1);
     s->end = CRM_END_EVENT;
     return 1;
 }
@@ -252,7 +282,7 @@ static carom_status halve(carom_world *w, double left, carom_status failed)
     s->fraction = 1;
     for (int k = 0; k < MAX_HALVINGS; k++) {
         s->fraction *= 0.5;
-        const carom_status e = crm_euler(w, s->fraction * left);
+        const carom_status e = crm_map_run(w, s->fraction * left);
         s->end = CRM_END_FRACTION;
         if (e >= 0) return e;
     }
@@ -262,7 +292,7 @@ static carom_status halve(carom_world *w, double left, carom_status failed)
 carom_status crm_run_through(carom_world *w, double left)
 {
     w->sub.end = CRM_END_FRAME;
-    const carom_status e = crm_euler(w, left);
+    const carom_status e = crm_map_run(w, left);
     return e == CAROM_E_NO_SOLUTION || e == CAROM_E_INFEASIBLE ? halve(w, left, e) : e;
 }
 

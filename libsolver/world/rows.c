@@ -69,32 +69,37 @@ void crm_joint_rows(const crm_joint *j, const double *q, double je[12], double e
     error[1] = (a.y - b.y) + (ra.y - rb.y);
 }
 
-static void fill_contacts(carom_world *w, int n, const crm_contact *contacts)
+/* A pair of sharp vertices has no tangent that slips: no friction in smooth motion. */
+static int sharp(const carom_world *w, const crm_contact *c)
+{
+    return c->recipe.kernel == CAROM_POINT_POINT &&
+           w->shapes[c->shape_a].view.radius + w->shapes[c->shape_b].view.radius <= 0;
+}
+
+static void fill_contacts(carom_world *w, const crm_substep *s)
 {
     crm_rows *r = &w->rows;
-    for (int k = 0; k < n; k++) {
-        const crm_contact *c = &contacts[k];
+    for (int k = 0; k < s->n_contacts; k++) {
+        const crm_contact *c = &s->moved[k];
         r->contact_body[2 * k] = crm_unknown(w, c->body_a);
         r->contact_body[2 * k + 1] = crm_unknown(w, c->body_b);
         crm_contact_rows(c, &r->jn[6 * k], &r->jt[6 * k]);
         r->mu[k] = crm_combine(w->settings.combine_friction, w->friction[c->body_a],
                                w->friction[c->body_b]);
+        if (s->map == CRM_MAP_SMOOTH && sharp(w, c)) r->mu[k] = 0;
     }
 }
 
-static double fill_joints(carom_world *w, const double *q)
+static void fill_joints(carom_world *w, const double *q)
 {
     crm_rows *r = &w->rows;
-    double largest = 0;
     for (int k = 0; k < w->n_joints; k++) {
-        crm_joint_rows(&w->joints[k], q, &r->je[12 * k], &r->ce[2 * k]);
-        largest = fmax(largest, fmax(fabs(r->ce[2 * k]), fabs(r->ce[2 * k + 1])));
+        crm_joint_rows(&w->joints[k], q, &r->je[12 * k], &r->error[2 * k]);
         for (int i = 2 * k; i < 2 * k + 2; i++) {
             r->joint_body[2 * i] = crm_unknown(w, w->joints[k].body_a);
             r->joint_body[2 * i + 1] = crm_unknown(w, w->joints[k].body_b);
         }
     }
-    return largest;
 }
 
 double crm_joint_drift(const carom_world *w, const double *q)
@@ -109,15 +114,6 @@ double crm_joint_drift(const carom_world *w, const double *q)
     return largest;
 }
 
-/* x += scale J' for one row; x has three numbers per moving body. */
-static void add_row(double *x, const int body[2], const double row[6], double scale)
-{
-    for (int side = 0; side < 2; side++) {
-        if (body[side] < 0) continue;
-        for (int i = 0; i < 3; i++) x[3 * body[side] + i] += scale * row[3 * side + i];
-    }
-}
-
 static void fill_inverse_masses(carom_world *w)
 {
     for (int b = 0; b < w->n_bodies; b++) {
@@ -130,8 +126,18 @@ static void fill_inverse_masses(carom_world *w)
     }
 }
 
-/* u = v0 + h (W f + g): the velocity without contacts and joints. */
-static void fill_free_velocity(carom_world *w, const crm_substep *s)
+void crm_rows_at(carom_world *w, crm_substep *s, const double *q)
+{
+    for (int k = 0; k < s->n_contacts; k++) {
+        s->moved[k] = s->contacts[k];
+        if (q != s->q0) crm_contact_refresh(w, q, &s->moved[k]);
+    }
+    fill_inverse_masses(w);
+    fill_contacts(w, s);
+    fill_joints(w, q);
+}
+
+void crm_free_velocity(carom_world *w, const crm_substep *s, const double *v, double h)
 {
     for (int b = 0; b < w->n_bodies; b++) {
         const int i = crm_unknown(w, b);
@@ -140,92 +146,59 @@ static void fill_free_velocity(carom_world *w, const crm_substep *s)
         for (int k = 0; k < 3; k++) {
             const double g = falls && k > 0 ? w->settings.gravity[k - 1] : 0;
             const double a = w->rows.inv_mass[3 * i + k] * s->force[3 * b + k] + g;
-            w->rows.u[3 * i + k] = s->v0[3 * b + k] + s->h * a;
+            w->rows.u[3 * i + k] = v[3 * b + k] + h * a;
         }
     }
 }
 
-/* c_n: restitution e u_n of an approach faster than v_rest, equations.md (3); gap / h ahead. */
-static void fill_velocity_targets(carom_world *w, crm_substep *s)
-{
-    for (int k = 0; k < s->n_contacts; k++) {
-        const crm_contact *c = &s->contacts[k];
-        const double un = crm_row_dot(&w->rows.jn[6 * k], s->v0, c->body_a, c->body_b);
-        const double e = crm_combine(w->settings.combine_restitution, w->restitution[c->body_a],
-                                     w->restitution[c->body_b]);
-        s->cn[k] = 0;
-        if (c->speculative) {
-            s->cn[k] = c->gap / s->h;
-        } else if (un < -w->rest_speed) {
-            s->cn[k] = s->restitution * e * un;
-        }
-    }
-}
-
-static carom_contact_problem problem_of(carom_world *w, int n_contacts)
+carom_contact_problem crm_problem(carom_world *w, const crm_substep *s, const crm_solve *c)
 {
     const crm_rows *r = &w->rows;
     carom_contact_problem p = {0};
     p.n_bodies = w->n_moving;
-    p.n_contacts = n_contacts;
+    p.n_contacts = s->n_contacts;
     p.n_joint_rows = 2 * w->n_joints;
     p.inv_mass = r->inv_mass;
     p.u = r->u;
     p.contact_body = r->contact_body;
     p.jn = r->jn;
     p.jt = r->jt;
-    p.mu = r->mu;
-    p.cn = r->cn;
+    p.mu = c->kind == CRM_CORRECTION ? r->zero : r->mu;
+    p.cn = c->cn;
+    p.ct = c->ct;
     p.joint_body = r->joint_body;
     p.je = r->je;
+    p.ce = c->ce;
     return p;
 }
 
-carom_contact_problem crm_velocity_problem(carom_world *w, crm_substep *s)
+void crm_velocity_targets(carom_world *w, const crm_substep *s, const double *v, crm_solve *c)
 {
-    fill_inverse_masses(w);
-    fill_free_velocity(w, s);
-    fill_contacts(w, s->n_contacts, s->contacts);
-    fill_joints(w, s->q0);
-    fill_velocity_targets(w, s);
-    carom_contact_problem p = problem_of(w, s->n_contacts);
-    p.cn = s->cn;
-    return p;
-}
-
-/* The displacement that the pressing contacts and the joints of this sub-step gave, taken back:
- * u = -h W (Jn' ln + Je' le), rows at the pose of the correction. */
-static void fill_withdrawn(carom_world *w, const crm_substep *s)
-{
-    crm_rows *r = &w->rows;
-    memset(r->u, 0, 3 * (size_t)w->n_moving * sizeof(double));
     for (int k = 0; k < s->n_contacts; k++) {
-        if (s->pressing[k]) add_row(r->u, &r->contact_body[2 * k], &r->jn[6 * k], -s->h * s->ln[k]);
+        const crm_contact *x = &s->contacts[k];
+        const double un = crm_row_dot(&w->rows.jn[6 * k], v, x->body_a, x->body_b);
+        const double e = crm_combine(w->settings.combine_restitution, w->restitution[x->body_a],
+                                     w->restitution[x->body_b]);
+        c->cn[k] = 0;
+        c->ct[k] = 0;
+        if (x->speculative) {
+            c->cn[k] = x->gap / s->h;
+        } else if (un < -w->rest_speed) {
+            c->cn[k] = s->restitution * e * un;
+        }
     }
-    for (int k = 0; k < 2 * w->n_joints; k++) {
-        add_row(r->u, &r->joint_body[2 * k], &r->je[6 * k], -s->h * s->le[k]);
-    }
-    for (int k = 0; k < 3 * w->n_moving; k++) r->u[k] *= r->inv_mass[k];
+    for (int k = 0; k < 2 * w->n_joints; k++) c->ce[k] = 0;
 }
 
-carom_contact_problem crm_position_problem(carom_world *w, crm_substep *s, const double *q,
-                                           double *violation)
+carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const crm_solve *c)
 {
-    double largest = 0;
-    fill_inverse_masses(w);
-    for (int k = 0; k < s->n_contacts; k++) {
-        s->moved[k] = s->contacts[k];
-        crm_contact_refresh(w, q, &s->moved[k]);
-        const double gap = s->moved[k].gap;
-        w->rows.cn[k] = gap;
-        largest = fmax(largest, s->pressing[k] ? fabs(gap) : -gap);
+    crm_rows_at(w, s, c->q);
+    switch (c->kind) {
+    case CRM_VELOCITY: crm_free_velocity(w, s, s->v0, s->h); break;
+    case CRM_CORRECTION: memset(w->rows.u, 0, 3 * (size_t)w->n_moving * sizeof(double)); break;
+    case CRM_IMPACT: crm_free_velocity(w, s, s->v0, 0); break;
+    case CRM_STAGE_1: crm_free_velocity(w, s, s->v0, 0.5 * s->h); break;
+    case CRM_STAGE_2: crm_free_velocity(w, s, c[-1].v, 0.5 * s->h); break;
     }
-    fill_contacts(w, s->n_contacts, s->moved);
-    largest = fmax(largest, fill_joints(w, q));
-    fill_withdrawn(w, s);
-    if (violation) *violation = largest;
-    carom_contact_problem p = problem_of(w, s->n_contacts);
-    p.mu = w->rows.zero;
-    p.ce = w->rows.ce;
-    return p;
+    return crm_problem(w, s, c);
 }

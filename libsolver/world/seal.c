@@ -60,7 +60,8 @@ static void set_scales(carom_world *w)
     if (w->settings.length > 0) length = w->settings.length;
     w->length = length > 0 ? length : 1;
     const double g = hypot(w->settings.gravity[0], w->settings.gravity[1]);
-    w->rest_speed = w->settings.rest_speed * sqrt(g * w->length);
+    w->speed = sqrt(g * w->length);
+    w->rest_speed = w->settings.rest_speed * w->speed;
 }
 
 static void number_unknowns(carom_world *w)
@@ -112,6 +113,7 @@ static carom_status project_once(carom_world *w)
     const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
     memcpy(s->q1, w->q, bytes);
     memset(s->pressing, 0, (size_t)s->n_contacts);
+    s->map = CRM_MAP_EULER;
     s->h = 0;
     const carom_status e = crm_project(w, s);
     if (e < 0) return e;

@@ -22,6 +22,7 @@ typedef struct word {
 } word;
 
 static const word WORDS[] = {
+    {"integrator", "located", CAROM_LOCATED},
     {"integrator", "euler", CAROM_EULER},
     {"combine_friction", "mean", CAROM_COMBINE_MEAN},
     {"combine_friction", "geometric", CAROM_COMBINE_GEOMETRIC},

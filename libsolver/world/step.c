@@ -26,10 +26,13 @@ static carom_status find_contacts(carom_world *w, double left, int last)
     return crm_detect_ahead(w, w->q, w->v, left, margin);
 }
 
+/* An impact: as a sub-step of its own, or within an Euler step. */
 static int bounced(const crm_substep *s)
 {
+    const crm_solve *c = &s->solve[0];
+    if (s->map != CRM_MAP_EULER) return s->map == CRM_MAP_IMPACT;
     for (int k = 0; k < s->n_contacts; k++) {
-        if (s->cn[k] < 0 && s->ln[k] > 0) return 1;
+        if (c->cn[k] < 0 && c->ln[k] > 0) return 1;
     }
     return 0;
 }
@@ -43,8 +46,9 @@ static carom_status commit(carom_world *w)
     if (e) return e;
     memcpy(w->q, s->q1, bytes);
     memcpy(w->v, s->v1, bytes);
-    w->stats->n_substeps++;
-    w->stats->n_events += s->end == CRM_END_EVENT || bounced(s);
+    w->stats->n_substeps += s->map != CRM_MAP_IMPACT;
+    w->stats->n_events +=
+        s->map == CRM_MAP_EULER ? s->end == CRM_END_EVENT || bounced(s) : bounced(s);
     w->stats->n_contacts = s->n_contacts;
     w->stats->degenerate += s->degenerate;
     return CAROM_OK;
@@ -65,8 +69,11 @@ static carom_status substep(carom_world *w, double *left)
     begin_substep(w);
     carom_status e = find_contacts(w, *left, last);
     if (e < 0) return e;
+    const int smooth = w->settings.integrator != CAROM_EULER && !last;
+    const int hit = smooth && crm_select_impact(w);
+    if (smooth) crm_select_contacts(w, hit);
     crm_guess_load(w);
-    e = last ? crm_run_through(w, *left) : crm_locate(w, *left);
+    e = hit ? crm_impact(w) : last ? crm_run_through(w, *left) : crm_locate(w, *left);
     if (e < 0) return e;
     if (e > w->stats->status) w->stats->status = e;
     *left = w->sub.end == CRM_END_FRAME ? 0 : *left - w->sub.h;
@@ -78,8 +85,8 @@ static carom_status advance(carom_world *w)
     const double dt = w->settings.dt;
     double left = dt + w->carry;
     w->carry = 0;
-    while (left > CARRY_TOL * dt) {
-        if (w->stats->n_substeps >= MAX_SUBSTEPS) return CAROM_E_NO_SOLUTION;
+    for (int k = 0; left > CARRY_TOL * dt; k++) {
+        if (k >= MAX_SUBSTEPS) return CAROM_E_NO_SOLUTION;
         const carom_status e = substep(w, &left);
         if (e < 0) return e;
     }

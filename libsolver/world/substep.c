@@ -31,10 +31,12 @@ static void lay_states(const carom_world *w, int n, crm_block *b, void *object)
     s->v0 = crm_carve(b, n3, sizeof(double));
     s->q1 = crm_carve(b, n3, sizeof(double));
     s->v1 = crm_carve(b, n3, sizeof(double));
-    s->le = crm_carve(b, rows, sizeof(double));
-    for (int k = 0; k < CRM_MAX_PROJECTIONS; k++) {
-        s->projection[k].q = crm_carve(b, n3, sizeof(double));
-        s->projection[k].le = crm_carve(b, rows, sizeof(double));
+    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
+        crm_solve *c = &s->solve[k];
+        c->q = crm_carve(b, n3, sizeof(double));
+        c->v = crm_carve(b, n3, sizeof(double));
+        c->ce = crm_carve(b, rows, sizeof(double));
+        c->le = crm_carve(b, rows, sizeof(double));
     }
 }
 
@@ -46,15 +48,15 @@ static void lay_contacts(const carom_world *w, int n, crm_block *b, void *object
     const size_t m = (size_t)n;
     s->contacts = crm_carve(b, m, sizeof *s->contacts);
     s->moved = crm_carve(b, m, sizeof *s->moved);
-    s->moved_lt = crm_carve(b, m, sizeof(double));
-    s->ln = crm_carve(b, m, sizeof(double));
-    s->lt = crm_carve(b, m, sizeof(double));
-    s->cn = crm_carve(b, m, sizeof(double));
-    s->mode = crm_carve(b, m, 1);
     s->pressing = crm_carve(b, m, 1);
-    for (int k = 0; k < CRM_MAX_PROJECTIONS; k++) {
-        s->projection[k].ln = crm_carve(b, m, sizeof(double));
-        s->projection[k].mode = crm_carve(b, m, 1);
+    s->target = crm_carve(b, m, sizeof(double));
+    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
+        crm_solve *c = &s->solve[k];
+        c->cn = crm_carve(b, m, sizeof(double));
+        c->ct = crm_carve(b, m, sizeof(double));
+        c->ln = crm_carve(b, m, sizeof(double));
+        c->lt = crm_carve(b, m, sizeof(double));
+        c->mode = crm_carve(b, m, 1);
     }
 }
 
@@ -94,7 +96,7 @@ static void lay_fixed_rows(const carom_world *w, int n, crm_block *b, void *obje
     const size_t n3 = 3 * (size_t)w->n_moving;
     r->joint_body = crm_carve(b, 2 * rows, sizeof(int));
     r->je = crm_carve(b, 6 * rows, sizeof(double));
-    r->ce = crm_carve(b, rows, sizeof(double));
+    r->error = crm_carve(b, rows, sizeof(double));
     r->u = crm_carve(b, n3, sizeof(double));
     r->v = crm_carve(b, n3, sizeof(double));
     r->inv_mass = crm_carve(b, n3, sizeof(double));
@@ -110,7 +112,6 @@ static void lay_contact_rows(const carom_world *w, int n, crm_block *b, void *ob
     r->jn = crm_carve(b, 6 * m, sizeof(double));
     r->jt = crm_carve(b, 6 * m, sizeof(double));
     r->mu = crm_carve(b, m, sizeof(double));
-    r->cn = crm_carve(b, m, sizeof(double));
     r->zero = crm_carve(b, m, sizeof(double));
 }
 

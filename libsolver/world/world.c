@@ -21,9 +21,9 @@ static carom_status check_settings(const carom_world_settings *s)
     const int bounded = s->dt < HUGE_VAL && s->margin < 1 && s->penetration < 1 &&
                         s->length < HUGE_VAL && s->rest_speed < HUGE_VAL;
     const int finite = isfinite(s->gravity[0]) && isfinite(s->gravity[1]);
-    const int words = s->integrator == CAROM_EULER && s->combine_friction >= 0 &&
-                      s->combine_friction <= CAROM_COMBINE_MAX && s->combine_restitution >= 0 &&
-                      s->combine_restitution <= CAROM_COMBINE_MAX;
+    const int words = s->integrator >= CAROM_LOCATED && s->integrator <= CAROM_EULER &&
+                      s->combine_friction >= 0 && s->combine_friction <= CAROM_COMBINE_MAX &&
+                      s->combine_restitution >= 0 && s->combine_restitution <= CAROM_COMBINE_MAX;
     return positive && bounded && finite && words && s->max_substeps >= 1 ? CAROM_OK
                                                                           : CAROM_E_ARGUMENT;
 }
@@ -183,9 +183,9 @@ carom_contact_info carom_world_contact(const carom_world *world, int k)
     i.point.y = s->q0[3 * c->body_a + 2] + c->arm_a.y;
     i.normal = c->normal;
     i.gap = c->gap;
-    i.ln = s->ln[k];
-    i.lt = s->lt[k];
-    i.mode = (carom_contact_mode)s->mode[k];
+    i.ln = s->solve[0].ln[k];
+    i.lt = s->solve[0].lt[k];
+    i.mode = (carom_contact_mode)s->solve[0].mode[k];
     return i;
 }
 

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+carom_integrator scene_integrator = CAROM_EULER;
+
 static void must(carom_world *w, carom_status e)
 {
     if (e < 0) fail_msg("%s: %s", carom_status_name(e), carom_world_error(w));
@@ -16,6 +18,7 @@ carom_world *scene_world(double g, double dt)
     carom_world *w = NULL;
     s.gravity[1] = -g;
     s.dt = dt;
+    s.integrator = scene_integrator;
     assert_int_equal(carom_world_create(&s, NULL, &w), CAROM_OK);
     return w;
 }

@@ -19,7 +19,8 @@ typedef enum carom_body_type {
 } carom_body_type;
 
 typedef enum carom_integrator {
-    CAROM_EULER /* the paper's step, corrected: EQUATIONS (1)-(7), (12), (14) */
+    CAROM_LOCATED, /* second order, impacts located: docs/step.md */
+    CAROM_EULER    /* the paper's step, corrected: docs/math/equations.md (1)-(7), (12), (14) */
 } carom_integrator;
 
 typedef enum carom_combine {
@@ -33,7 +34,7 @@ typedef enum carom_combine {
  * `--set` use these names (carom_world_settings_set). */
 #define CAROM_WORLD_SETTINGS(X)                                                                    \
     X(dt, double, 1.0 / 60, "s", "length of a step")                                               \
-    X(integrator, int, CAROM_EULER, "", "euler")                                                   \
+    X(integrator, int, CAROM_LOCATED, "", "located or euler")                                      \
     X(combine_friction, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")                \
     X(combine_restitution, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")             \
     X(length, double, 0, "m", "length scale L; 0: largest diameter of a dynamic body's shape")     \
@@ -70,13 +71,13 @@ typedef struct carom_body_def {
     int n_shapes;              /* >= 0 */
     const carom_shape *shapes; /* copied; vertices relative to the position = center of mass */
     carom_pose pose;
-    double velocity[3];  /* (omega, vx, vy) [rad/s, m/s, m/s] */
-    double force[3];     /* constant (torque, fx, fy) [N m, N, N] */
-    double mass;         /* [kg], > 0 when dynamic */
-    double inertia;      /* about the center of mass [kg m^2], > 0 when dynamic */
-    double friction;     /* [1], >= 0 */
-    double restitution;  /* [1], 0 to 1 */
-    int collide;         /* 0: no contacts at all */
+    double velocity[3]; /* (omega, vx, vy) [rad/s, m/s, m/s] */
+    double force[3];    /* constant (torque, fx, fy) [N m, N, N] */
+    double mass;        /* [kg], > 0 when dynamic */
+    double inertia;     /* about the center of mass [kg m^2], > 0 when dynamic */
+    double friction;    /* [1], >= 0 */
+    double restitution; /* [1], 0 to 1 */
+    int collide;        /* 0: no contacts at all */
     carom_filter filter;
 } carom_body_def;
 
@@ -109,18 +110,18 @@ CAROM_API carom_status carom_world_seal(carom_world *world);
 
 typedef struct carom_step_stats {
     carom_status status;
-    double residual;     /* largest of the step's contact problems [1] */
-    double penetration;  /* largest overlap at the end [m], >= 0 */
-    double joint_drift;  /* largest position error of a joint at the end [m] */
-    double energy;       /* kinetic + gravitational at the end [J] */
-    int n_candidates;    /* pairs whose boxes touch */
-    int n_contacts;      /* contact points of the last sub-step */
+    double residual;    /* largest of the step's contact problems [1] */
+    double penetration; /* largest overlap at the end [m], >= 0 */
+    double joint_drift; /* largest position error of a joint at the end [m] */
+    double energy;      /* kinetic + gravitational at the end [J] */
+    int n_candidates;   /* pairs whose boxes touch */
+    int n_contacts;     /* contact points of the last sub-step */
     int n_substeps;
-    int n_events;        /* impacts: sub-steps in which restitution acted or a step was shortened */
+    int n_events; /* impacts: sub-steps in which restitution acted or a step was shortened */
     int factorizations;
     int iterations;
-    int degenerate;      /* weakly active or stick/slip borderline contacts */
-    long allocations;    /* requests to the allocator during this step */
+    int degenerate;            /* weakly active or stick/slip borderline contacts */
+    long allocations;          /* requests to the allocator during this step */
     carom_contact_stage stage; /* deepest stage of the ladder used */
 } carom_step_stats;
 
@@ -156,10 +157,10 @@ CAROM_API carom_status carom_world_set_parameters(carom_world *world, const caro
 /* One contact point of the last sub-step. */
 typedef struct carom_contact_info {
     int body_a, body_b;
-    carom_vec2 point;    /* on A, world [m] */
-    carom_vec2 normal;   /* from A to B */
-    double gap;          /* at the start of the sub-step [m] */
-    double ln, lt;       /* impulses along normal and tangent [N s] */
+    carom_vec2 point;  /* on A, world [m] */
+    carom_vec2 normal; /* from A to B */
+    double gap;        /* at the start of the sub-step [m] */
+    double ln, lt;     /* impulses along normal and tangent [N s] */
     carom_contact_mode mode;
 } carom_contact_info;
 CAROM_API int carom_world_n_contacts(const carom_world *world);
@@ -170,13 +171,13 @@ typedef struct carom_world_size {
     int n_dynamic, n_static, n_kinematic;
     int n_shapes, n_vertices;
     int n_joints;
-    int n_unknowns;    /* 3 per moving body */
+    int n_unknowns; /* 3 per moving body */
     int n_joint_rows;
-    int n_contacts;    /* last sub-step */
-    int n_friction;    /* ... of them with a tangential row */
+    int n_contacts;      /* last sub-step */
+    int n_friction;      /* ... of them with a tangential row */
     int factor_nonzeros; /* of the last factorization */
-    size_t bytes;      /* held now */
-    size_t bytes_high; /* high-water mark */
+    size_t bytes;        /* held now */
+    size_t bytes_high;   /* high-water mark */
 } carom_world_size;
 CAROM_API carom_world_size carom_world_measure(const carom_world *world);
 

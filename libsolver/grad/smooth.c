@@ -1,0 +1,155 @@
+/* smooth.c: the two-stage map backward.  Stage 1 ends at the fixed point v = G(v) of a Newton
+ * iteration with fixed rows.  Its adjoint is the sum of the passes l, G'l, G'G'l, ..., which
+ * converges as the iteration did; every pass adds what G depends on. */
+#include "grad/internal.h"
+
+#include <math.h>
+
+/* Passes end when the rest is below this [cotangent of the first pass]. */
+static const double PASS_TOL = 1e-15;
+enum { MAX_PASSES = 40 };
+
+static void add_row(double *v_bar, int body_a, int body_b, const double row[6], double scale)
+{
+    for (int i = 0; i < 3; i++) {
+        v_bar[3 * body_a + i] += scale * row[i];
+        v_bar[3 * body_b + i] += scale * row[3 + i];
+    }
+}
+
+static void add_outer(double row_bar[6], int body_a, int body_b, const double *v, double scale)
+{
+    for (int i = 0; i < 3; i++) {
+        row_bar[i] += scale * v[3 * body_a + i];
+        row_bar[3 + i] += scale * v[3 * body_b + i];
+    }
+}
+
+/* c_n = (gap(p) - target) / h - J_n v, c_t = slip(q0, p) / h - J_t v: one contact of an iteration
+ * after the one that ended at p = q0 + h v.  Adds to v_bar, rows, p_bar, q0_bar, h_bar, gap_bar. */
+static void contact_side_vjp(crm_reverse *r, const crm_substep *s, int k, const double *v,
+                             const double *p, double *v_bar, double *q0_bar, double *h_bar,
+                             int with_parameters)
+{
+    const carom_world *w = r->world;
+    const double cn_bar = r->bars.cn[k];
+    const double ct_bar = w->rows.mu[k] > 0 ? r->bars.ct[k] : 0;
+    crm_contact x = s->contacts[k];
+    const int a = x.body_a;
+    const int b = x.body_b;
+    add_row(v_bar, a, b, &w->rows.jn[6 * k], -cn_bar);
+    add_row(v_bar, a, b, &w->rows.jt[6 * k], -ct_bar);
+    add_outer(&r->bars.jn[6 * k], a, b, v, -cn_bar);
+    add_outer(&r->bars.jt[6 * k], a, b, v, -ct_bar);
+    crm_contact_refresh(w, p, &x);
+    const carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, cn_bar / s->h};
+    crm_geometry_vjp(r, p, &x, &bar, r->pose_bar, with_parameters);
+    *h_bar -= cn_bar * (x.gap - s->target[k]) / (s->h * s->h);
+    if (s->target[k] != 0) {
+        r->gap_bar[k] -= cn_bar / s->h;
+        *h_bar -= cn_bar * w->rest_speed / s->h;
+    }
+    if (ct_bar == 0) return;
+    *h_bar -= ct_bar * crm_slip(w, &x, s->q0, p) / (s->h * s->h);
+    crm_slip_vjp(r, &x, s->q0, p, ct_bar / s->h, q0_bar, r->pose_bar, with_parameters);
+}
+
+/* c_e = error(p) / h - J_e v of one joint. */
+static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int k, const double *v,
+                           const double *p, double *v_bar, double *h_bar, int with_parameters)
+{
+    const carom_world *w = r->world;
+    const crm_joint *j = &w->joints[k];
+    static const double none[12] = {0};
+    double je[12];
+    double error[2];
+    double error_bar[2];
+    crm_joint_rows(j, p, je, error);
+    for (int i = 0; i < 2; i++) {
+        const int row = 2 * k + i;
+        const double ce_bar = r->bars.ce[row];
+        add_row(v_bar, j->body_a, j->body_b, &w->rows.je[6 * row], -ce_bar);
+        add_outer(&r->bars.je[6 * row], j->body_a, j->body_b, v, -ce_bar);
+        error_bar[i] = ce_bar / s->h;
+        *h_bar -= ce_bar * error[i] / (s->h * s->h);
+    }
+    crm_joint_vjp(r, p, k, none, error_bar, r->pose_bar, with_parameters);
+}
+
+/* Right-hand sides from the velocity v of the fixed point, which ends at p = q0 + h v. */
+static void sides_vjp(crm_reverse *r, const crm_substep *s, const double *v, double *v_bar,
+                      double *q0_bar, double *h_bar, int with_parameters)
+{
+    const carom_world *w = r->world;
+    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
+    double *p = r->pose;
+    memcpy(p, s->q0, bytes);
+    crm_move(w, p, v, s->h);
+    memset(r->pose_bar, 0, bytes);
+    for (int k = 0; k < s->n_contacts; k++) {
+        r->gap_bar[k] = 0;
+        contact_side_vjp(r, s, k, v, p, v_bar, q0_bar, h_bar, with_parameters);
+    }
+    for (int k = 0; k < w->n_joints; k++) {
+        joint_side_vjp(r, s, k, v, p, v_bar, h_bar, with_parameters);
+    }
+    crm_move_vjp(w, s, v, r->pose_bar, v_bar, h_bar);
+    for (int k = 0; k < 3 * w->n_bodies; k++) q0_bar[k] += r->pose_bar[k];
+}
+
+/* One pass: r->solve_bar becomes G' r->solve_bar. */
+static carom_status pass_vjp(crm_reverse *r, crm_substep *s, double *q0_bar, double *v0_bar,
+                             int with_parameters, double *h_bar)
+{
+    const crm_solve *c = &s->solve[0];
+    const carom_status e = crm_solve_vjp(r, s, c, r->solve_bar);
+    if (e < 0) return e;
+    memset(r->solve_bar, 0, 3 * (size_t)r->world->n_bodies * sizeof(double));
+    crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, v0_bar, h_bar, with_parameters);
+    if (with_parameters) crm_mass_vjp(r);
+    sides_vjp(r, s, c->v, r->solve_bar, q0_bar, h_bar, with_parameters);
+    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q0_bar, with_parameters);
+    return CAROM_OK;
+}
+
+static double largest(int n, const double *x)
+{
+    double top = 0;
+    for (int k = 0; k < n; k++) top = fmax(top, fabs(x[k]));
+    return top;
+}
+
+/* v1 from vh at q1: leaves the cotangent of vh in r->solve_bar; q_bar gets that of the rows. */
+static carom_status stage_2_vjp(crm_reverse *r, crm_substep *s, double *q_bar, const double *v_bar,
+                                int with_parameters, double *h_bar)
+{
+    const crm_solve *c = &s->solve[1];
+    const carom_status e = crm_solve_vjp(r, s, c, v_bar);
+    if (e < 0) return e;
+    memset(r->solve_bar, 0, 3 * (size_t)r->world->n_bodies * sizeof(double));
+    crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, r->solve_bar, h_bar, with_parameters);
+    if (with_parameters) crm_mass_vjp(r);
+    for (int k = 0; k < s->n_contacts; k++) {
+        const int open = c->cn[k] != 0;
+        r->gap_bar[k] = open ? r->bars.cn[k] / s->h : 0;
+        if (open) *h_bar -= r->bars.cn[k] * c->cn[k] / s->h;
+    }
+    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar, with_parameters);
+    return CAROM_OK;
+}
+
+carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
+                            int with_parameters, double *h_bar)
+{
+    const int n = 3 * r->world->n_bodies;
+    *h_bar = 0;
+    carom_status e = stage_2_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+    crm_move_vjp(r->world, s, s->solve[0].v, q_bar, r->solve_bar, h_bar);
+    memset(v_bar, 0, (size_t)n * sizeof *v_bar);
+    const double first = largest(n, r->solve_bar);
+    for (int k = 0; e >= 0 && k < MAX_PASSES; k++) {
+        if (largest(n, r->solve_bar) <= PASS_TOL * first) break;
+        e = pass_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+    }
+    return e;
+}

@@ -1,0 +1,209 @@
+/* smooth.c: the symmetric two-stage map of second order (RATTLE with contacts), and the impact.
+ * docs/step.md. */
+#include "world/internal.h"
+
+#include <math.h>
+
+/* Newton's method ends when no right-hand side moves a position by more than this [L]. */
+static const double NEWTON_TOL = 1e-14;
+/* It converges linearly, by the turn of a body per sub-step; 30 allow for a turn of a third. */
+enum { MAX_NEWTON = 30 };
+
+/* Stage 1 aims at gap 0; from a deeper overlap it recovers at v_rest, not at gap / h, which in a
+ * short sub-step would be a kick. */
+static void set_targets(const carom_world *w, crm_substep *s)
+{
+    for (int k = 0; k < s->n_contacts; k++) {
+        const double gap = s->contacts[k].gap;
+        s->target[k] = gap < -w->rest_speed * s->h ? gap + w->rest_speed * s->h : 0;
+    }
+}
+
+static void first_sides(const carom_world *w, const crm_substep *s, crm_solve *c)
+{
+    for (int k = 0; k < s->n_contacts; k++) {
+        c->cn[k] = (s->contacts[k].gap - s->target[k]) / s->h;
+        c->ct[k] = 0;
+    }
+    for (int k = 0; k < 2 * w->n_joints; k++) c->ce[k] = w->rows.error[k] / s->h;
+}
+
+static double joint_row_dot(const carom_world *w, int row, const double *v)
+{
+    const crm_joint *j = &w->joints[row / 2];
+    return crm_row_dot(&w->rows.je[6 * row], v, j->body_a, j->body_b);
+}
+
+/* Right-hand sides of the next iteration from the end pose of this one: the true gap, slip and
+ * joint error there, less their linear part.  Returns the largest move that matters [m]. */
+static double next_sides(const carom_world *w, const crm_substep *s, const crm_solve *c,
+                         crm_solve *next)
+{
+    double largest = 0;
+    for (int k = 0; k < s->n_contacts; k++) {
+        crm_contact x = s->contacts[k];
+        const double un = crm_row_dot(&w->rows.jn[6 * k], c->v, x.body_a, x.body_b);
+        const double ut = crm_row_dot(&w->rows.jt[6 * k], c->v, x.body_a, x.body_b);
+        crm_contact_refresh(w, s->q1, &x);
+        const double miss = x.gap - s->target[k];
+        next->cn[k] = miss / s->h - un;
+        next->ct[k] = 0;
+        if (w->rows.mu[k] > 0) next->ct[k] = crm_slip(w, &x, s->q0, s->q1) / s->h - ut;
+        if (c->mode[k] == CAROM_SEPARATED) {
+            largest = fmax(largest, -miss);
+            continue;
+        }
+        largest = fmax(largest, s->h * fabs(next->cn[k] - c->cn[k]));
+        if (c->mode[k] == CAROM_STICK) {
+            largest = fmax(largest, s->h * fabs(next->ct[k] - c->ct[k]));
+        }
+    }
+    for (int k = 0; k < w->n_joints; k++) {
+        double je[12];
+        double error[2];
+        crm_joint_rows(&w->joints[k], s->q1, je, error);
+        for (int i = 2 * k; i < 2 * k + 2; i++) {
+            next->ce[i] = error[i % 2] / s->h - joint_row_dot(w, i, c->v);
+            largest = fmax(largest, s->h * fabs(next->ce[i] - c->ce[i]));
+        }
+    }
+    return largest;
+}
+
+static void end_pose(const carom_world *w, crm_substep *s, const crm_solve *c)
+{
+    memcpy(s->q1, s->q0, 3 * (size_t)w->n_bodies * sizeof(double));
+    crm_move(w, s->q1, c->v, s->h);
+}
+
+static void take_sides(const carom_world *w, const crm_substep *s, const crm_solve *from,
+                       crm_solve *to)
+{
+    for (int k = 0; k < s->n_contacts; k++) {
+        to->cn[k] = from->cn[k];
+        to->ct[k] = from->ct[k];
+    }
+    for (int k = 0; k < 2 * w->n_joints; k++) to->ce[k] = from->ce[k];
+}
+
+/* Stage 1: M vh = M v0 + h/2 f + J0' l with gaps, slips and joints met at q1 = q0 + h vh. */
+static carom_status stage_1(carom_world *w, crm_substep *s)
+{
+    const double tol = NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
+    crm_solve *c = &s->solve[0];
+    c->kind = CRM_STAGE_1;
+    memcpy(c->q, s->q0, 3 * (size_t)w->n_bodies * sizeof(double));
+    crm_rows_at(w, s, s->q0);
+    crm_free_velocity(w, s, s->v0, 0.5 * s->h);
+    set_targets(w, s);
+    first_sides(w, s, c);
+    for (int k = 0; k < MAX_NEWTON; k++) {
+        const carom_status e = crm_solve_run(w, s, c, 1);
+        if (e < 0) return e;
+        end_pose(w, s, c);
+        if (!s->n_contacts && !w->n_joints) break;
+        if (next_sides(w, s, c, &s->solve[1]) <= tol) break;
+        take_sides(w, s, &s->solve[1], c);
+    }
+    return CAROM_OK;
+}
+
+/* Stage 2 at q1: M v1 = M vh + h/2 f + J1' l with the contacts still closed and the joints at rest;
+ * a contact that has opened may close no faster than gap / h. */
+static carom_status stage_2(carom_world *w, crm_substep *s)
+{
+    const double slop = w->settings.margin * w->length;
+    const crm_solve *last = &s->solve[0];
+    crm_solve *c = &s->solve[1];
+    c->kind = CRM_STAGE_2;
+    memcpy(c->q, s->q1, 3 * (size_t)w->n_bodies * sizeof(double));
+    crm_rows_at(w, s, s->q1);
+    crm_free_velocity(w, s, last->v, 0.5 * s->h);
+    for (int k = 0; k < s->n_contacts; k++) {
+        c->cn[k] = s->moved[k].gap > slop ? s->moved[k].gap / s->h : 0;
+        c->ct[k] = 0;
+        c->mode[k] = last->mode[k];
+    }
+    for (int k = 0; k < 2 * w->n_joints; k++) c->ce[k] = 0;
+    const carom_status e = crm_solve_run(w, s, c, 1);
+    if (e < 0) return e;
+    s->n_solves = 2;
+    memcpy(s->v1, c->v, 3 * (size_t)w->n_bodies * sizeof(double));
+    return CAROM_OK;
+}
+
+carom_status crm_smooth(carom_world *w, double h)
+{
+    crm_substep *s = &w->sub;
+    s->map = CRM_MAP_SMOOTH;
+    s->h = h;
+    s->restitution = 1;
+    const carom_status e = stage_1(w, s);
+    return e < 0 ? e : stage_2(w, s);
+}
+
+carom_status crm_impact(carom_world *w)
+{
+    crm_substep *s = &w->sub;
+    crm_solve *c = &s->solve[0];
+    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
+    s->map = CRM_MAP_IMPACT;
+    s->h = 0;
+    s->n_solves = 1;
+    s->end = CRM_END_IMPACT;
+    c->kind = CRM_IMPACT;
+    memcpy(c->q, s->q0, bytes);
+    crm_rows_at(w, s, s->q0);
+    crm_free_velocity(w, s, s->v0, 0);
+    const carom_status e = crm_solve_bounce(w, s, c, s->v0);
+    if (e < 0) return e;
+    memcpy(s->v1, c->v, bytes);
+    memcpy(s->q1, s->q0, bytes);
+    return e;
+}
+
+static double approach(const crm_substep *s, int k)
+{
+    double jn[6];
+    double jt[6];
+    const crm_contact *c = &s->contacts[k];
+    crm_contact_rows(c, jn, jt);
+    return crm_row_dot(jn, s->v0, c->body_a, c->body_b);
+}
+
+/* Fastest point of a moving body [m/s]. */
+static double top_speed(const carom_world *w, const double *v)
+{
+    double top = 0;
+    for (int k = 0; k < w->n_shapes; k++) {
+        const double *vb = v + 3 * w->shapes[k].body;
+        top = fmax(top, hypot(vb[1], vb[2]) + fabs(vb[0]) * w->shapes[k].reach);
+    }
+    return top;
+}
+
+int crm_select_impact(carom_world *w)
+{
+    crm_substep *s = &w->sub;
+    const double hit = CRM_HIT_TOL * w->length + crm_rounding(w);
+    const double slow = CRM_REST_TOL * (top_speed(w, s->v0) + w->speed);
+    int any = 0;
+    for (int k = 0; k < s->n_contacts; k++) {
+        if (s->contacts[k].gap <= hit && approach(s, k) < -slow) any = 1;
+    }
+    return any;
+}
+
+void crm_select_contacts(carom_world *w, int for_impact)
+{
+    crm_substep *s = &w->sub;
+    const double slop = w->settings.margin * w->length;
+    int n = 0;
+    for (int k = 0; k < s->n_contacts; k++) {
+        const double un = approach(s, k);
+        const int meets = un <= w->rest_speed || s->contacts[k].gap < -slop;
+        const int rests = meets && (un >= -w->rest_speed || s->contacts[k].gap < -slop);
+        if (for_impact ? meets : rests) s->contacts[n++] = s->contacts[k];
+    }
+    s->n_contacts = n;
+}
