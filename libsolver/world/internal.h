@@ -169,6 +169,7 @@ struct carom_world {
     int sealed;
     int n_moving;
     double length;     /* L [m] */
+    int smooth;        /* 1: located, two-stage map; 0: Euler */
     double speed;      /* sqrt(g L) [m/s] */
     double rest_speed; /* v_rest [m/s] */
     void *seal_block;  /* the arrays made by seal */
@@ -289,7 +290,7 @@ carom_status crm_guess_save(carom_world *w);
 carom_status crm_euler(carom_world *w, double h);  /* euler.c */
 carom_status crm_smooth(carom_world *w, double h); /* smooth.c */
 carom_status crm_impact(carom_world *w);           /* smooth.c */
-/* euler.c or smooth.c by the world's integrator. */
+/* euler.c or smooth.c, as sealed. */
 carom_status crm_map_run(carom_world *w, double h);
 /* Corrects sub.q1 until no contact of sub overlaps and no joint drifts. */
 carom_status crm_project(carom_world *w, crm_substep *s);

@@ -6,6 +6,9 @@
 
 /* Rounds of detection and projection for an overlapping initial scene. */
 enum { MAX_ROUNDS = 50 };
+/* Moving bodies up to which `located` runs its second-order map.  Without islands every impact and
+ * every Newton iteration solves the whole world: beyond this the Euler map is used instead. */
+enum { LOCATED_BODIES = 48 };
 
 static double farthest(const carom_shape *s)
 {
@@ -70,6 +73,7 @@ static void number_unknowns(carom_world *w)
     for (int b = 0; b < w->n_bodies; b++) {
         w->bodies[b].unknown = w->bodies[b].type == CAROM_STATIC ? -1 : w->n_moving++;
     }
+    w->smooth = w->settings.integrator == CAROM_LOCATED && w->n_moving <= LOCATED_BODIES;
 }
 
 static void lay_world(carom_world *w, crm_block *b)

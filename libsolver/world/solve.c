@@ -102,5 +102,5 @@ carom_status crm_guess_save(carom_world *w)
 
 carom_status crm_map_run(carom_world *w, double h)
 {
-    return w->settings.integrator == CAROM_EULER ? crm_euler(w, h) : crm_smooth(w, h);
+    return w->smooth ? crm_smooth(w, h) : crm_euler(w, h);
 }

@@ -69,7 +69,7 @@ static carom_status substep(carom_world *w, double *left)
     begin_substep(w);
     carom_status e = find_contacts(w, *left, last);
     if (e < 0) return e;
-    const int smooth = w->settings.integrator != CAROM_EULER && !last;
+    const int smooth = w->smooth && !last;
     const int hit = smooth && crm_select_impact(w);
     if (smooth) crm_select_contacts(w, hit);
     crm_guess_load(w);

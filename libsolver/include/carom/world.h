@@ -19,7 +19,7 @@ typedef enum carom_body_type {
 } carom_body_type;
 
 typedef enum carom_integrator {
-    CAROM_LOCATED, /* second order, impacts located: docs/step.md */
+    CAROM_LOCATED, /* second order, impacts located; Euler beyond 48 moving bodies: docs/step.md */
     CAROM_EULER    /* the paper's step, corrected: docs/math/equations.md (1)-(7), (12), (14) */
 } carom_integrator;
 
