@@ -61,6 +61,26 @@ static int facing(const faces *f, int i, carom_vec2 x)
     return ku > kv ? before : i;
 }
 
+/* To the neighboring face while that is higher: a good first face makes good bounds. */
+static void climb_faces(faces *f)
+{
+    int ahead = 1;
+    for (int steps = 0; steps < 2 * f->p->n; steps++) {
+        const int k = ahead ? crm_next(f->p, f->edge) : crm_prev(f->p, f->edge);
+        int j = f->vertex;
+        const double h = height(f, k, &j);
+        if (h > f->height) {
+            f->edge = k;
+            f->vertex = j;
+            f->height = h;
+        } else if (ahead && steps == 0) {
+            ahead = 0;
+        } else {
+            return;
+        }
+    }
+}
+
 static faces faces_of(const crm_placed *p, const crm_placed *q, int i, int j)
 {
     faces f;
@@ -75,6 +95,7 @@ static faces faces_of(const crm_placed *p, const crm_placed *q, int i, int j)
     if (p->n > 1) {
         f.edge = facing(&f, i, seen(&f, q->v[j]));
         f.height = height(&f, f.edge, &f.vertex);
+        climb_faces(&f);
     }
     return f;
 }
@@ -98,6 +119,7 @@ static void offer_faces(const faces *f, int on_b, double at_least, top *t)
     double least = (at_least > t->height ? at_least : t->height) - t->slack;
     double key = signed_square(least);
     carom_vec2 v = p->v[p->n - 1];
+    int low = f->vertex; /* follows the normal around: the climbs of one trip add up to one trip */
     for (int i = 0; i < p->n; i++) {
         const carom_vec2 w = p->v[i];
         const carom_vec2 u = crm_right(crm_sub(w, v));
@@ -105,13 +127,12 @@ static void offer_faces(const faces *f, int on_b, double at_least, top *t)
         v = w;
         if (signed_square(bound) < key * crm_dot(u, u)) continue;
         const int k = crm_prev(p, i);
-        int j = f->vertex;
-        const double h = k == f->edge ? f->height : height(f, k, &j);
+        const double h = height(f, k, &low);
         if (h > t->height) {
             t->second = t->height;
             t->height = h;
             t->edge = k;
-            t->vertex = j;
+            t->vertex = low;
             t->on_b = on_b;
             if (h - t->slack > least) least = h - t->slack;
             key = signed_square(least);
@@ -125,12 +146,12 @@ static void offer_faces(const faces *f, int on_b, double at_least, top *t)
 static void first_of_tied(const faces *f, int on_b, double least, int *found, top *t)
 {
     const crm_placed *p = f->p;
+    int low = f->vertex;
     for (int k = 0; p->n > 1 && !*found && k < p->n; k++) {
-        int j = f->vertex;
-        if (!(height(f, k, &j) >= least)) continue;
+        if (!(height(f, k, &low) >= least)) continue;
         *found = 1;
         t->edge = k;
-        t->vertex = j;
+        t->vertex = low;
         t->on_b = on_b;
     }
 }
