@@ -367,7 +367,7 @@ static void recipes_of_manifolds(void **state)
     rng r = rng_from(7);
     int seen[3][2] = {{0}};
     for (int i = 0; i < 6000; i++) {
-        scene k;
+        scene k = {0}; /* vertices that a shape has not are read, times a gradient of zero */
         convex_posed(&r, 1 + rng_int(&r, 6), &k.s[0]);
         convex_posed(&r, 1 + rng_int(&r, 6), &k.s[1]);
         const carom_manifold m =
