@@ -27,13 +27,13 @@ typedef struct carom_contact_problem {
     const double *u;         /* 3 n_bodies: velocity without contacts and joints, v + h f / m */
     const int *contact_body; /* 2 n_contacts: body A and body B of each; -1 the world */
     const double *jn;        /* 6 n_contacts: row of J_n, 3 numbers of A then 3 of B */
-    const double *jt;        /* 6 n_contacts: row of J_t; a frictionless contact's row is not read */
-    const double *mu;        /* n_contacts [1], >= 0 */
-    const double *cn;        /* n_contacts [m/s] */
-    const double *ct;        /* n_contacts [m/s], NULL: zero */
-    const int *joint_body;   /* 2 n_joint_rows */
-    const double *je;        /* 6 n_joint_rows */
-    const double *ce;        /* n_joint_rows, NULL: zero */
+    const double *jt;      /* 6 n_contacts: row of J_t; a frictionless contact's row is not read */
+    const double *mu;      /* n_contacts [1], >= 0 */
+    const double *cn;      /* n_contacts [m/s] */
+    const double *ct;      /* n_contacts [m/s], NULL: zero */
+    const int *joint_body; /* 2 n_joint_rows */
+    const double *je;      /* 6 n_joint_rows */
+    const double *ce;      /* n_joint_rows, NULL: zero */
 } carom_contact_problem;
 
 typedef enum carom_contact_mode {

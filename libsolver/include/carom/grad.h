@@ -22,7 +22,8 @@ CAROM_API carom_status carom_tape_step(carom_tape *tape, const double *force,
 CAROM_API void carom_tape_rewind(carom_tape *tape);
 CAROM_API int carom_tape_steps(const carom_tape *tape);
 CAROM_API size_t carom_tape_bytes(const carom_tape *tape);
-/* Recorded state after `step` steps, 0 <= step <= carom_tape_steps: 3 n_bodies, owned by the tape. */
+/* Recorded state after `step` steps, 0 <= step <= carom_tape_steps: 3 n_bodies, owned by the tape.
+ */
 CAROM_API const double *carom_tape_q(const carom_tape *tape, int step);
 CAROM_API const double *carom_tape_v(const carom_tape *tape, int step);
 
@@ -36,23 +37,23 @@ typedef struct carom_state_bar {
 /* Where the gradient goes: NULL is not computed; given arrays are overwritten.
  * Mass and inertia are partial derivatives of the stored numbers: gravity is mass * g. */
 typedef struct carom_gradient {
-    double *q0;          /* 3 n_bodies, state at the start of the tape */
-    double *v0;          /* 3 n_bodies */
-    double *mass;        /* n_bodies */
-    double *inertia;     /* n_bodies */
-    double *friction;    /* n_bodies */
-    double *restitution; /* n_bodies */
-    double *gravity;     /* 2 */
-    double *force;       /* 3 n_bodies: a constant force on each body through all steps */
-    double *force_steps; /* 3 n_bodies x steps: the force of each step */
-    double *dt;          /* 1: length of the step */
-    double *radius;      /* n_shapes, in the order of adding */
-    carom_vec2 *vertices;/* n_vertices, in the order of adding; body frame */
-    carom_vec2 *anchors; /* 2 n_joints: anchor in the frame of body A, then of body B */
+    double *q0;           /* 3 n_bodies, state at the start of the tape */
+    double *v0;           /* 3 n_bodies */
+    double *mass;         /* n_bodies */
+    double *inertia;      /* n_bodies */
+    double *friction;     /* n_bodies */
+    double *restitution;  /* n_bodies */
+    double *gravity;      /* 2 */
+    double *force;        /* 3 n_bodies: a constant force on each body through all steps */
+    double *force_steps;  /* 3 n_bodies x steps: the force of each step */
+    double *dt;           /* 1: length of the step */
+    double *radius;       /* n_shapes, in the order of adding */
+    carom_vec2 *vertices; /* n_vertices, in the order of adding; body frame */
+    carom_vec2 *anchors;  /* 2 n_joints: anchor in the frame of body A, then of body B */
 } carom_gradient;
 
 typedef struct carom_gradient_stats {
-    int degenerate;      /* contacts at kinks, all sub-steps: a one-sided element was taken */
+    int degenerate;            /* contacts at kinks, all sub-steps: a one-sided element was taken */
     int first_degenerate_step; /* -1: none */
     int factorizations;
 } carom_gradient_stats;
