@@ -5,7 +5,7 @@
 /* Compliance of an active row in unit scale: the proximal term [1]. */
 #define PROXIMAL 1e-10
 /* Passes stop when the defect is below this [1] ... */
-#define DEFECT_DONE 1e-15
+#define DEFECT_DONE 4e-15
 /* ... or, below this, no longer halves. */
 #define DEFECT_SMALL 1e-11
 /* A mode is kept while it is violated by less, in unit scale [1]. */

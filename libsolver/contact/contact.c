@@ -85,21 +85,20 @@ static carom_status give_row(carom_contact_solver *c, const carom_contact_proble
 }
 
 /* Rows that no impulse can change must hold as they are. */
-static carom_status check_prescribed(carom_contact_solver *c, const carom_contact_problem *p)
+static carom_status check_prescribed(carom_contact_solver *c, const carom_contact_problem *p,
+                                     double speed)
 {
-    double limit = 0; /* found when needed */
+    const double limit = c->settings.accept * speed;
     for (int k = 0; k < p->n_contacts; k++) {
         const int *body = p->contact_body + 2 * k;
         const double a = crm_row_times(p->jn + 6 * k, body, p->u) + p->cn[k];
         if (a >= 0 || crm_row_weight(p->jn + 6 * k, body, p->inv_mass) > 0) continue;
-        if (!(limit > 0)) limit = c->settings.accept * crm_contact_speed(p);
         if (a < -limit) return give_row(c, p, k, 1);
     }
     for (int r = 0; r < p->n_joint_rows; r++) {
         const int *body = p->joint_body + 2 * r;
         if (crm_row_weight(p->je + 6 * r, body, p->inv_mass) > 0) continue;
         const double e = crm_row_times(p->je + 6 * r, body, p->u) + (p->ce ? p->ce[r] : 0);
-        if (!(limit > 0)) limit = c->settings.accept * crm_contact_speed(p);
         if (fabs(e) > limit) return give_row(c, p, p->n_contacts + r, e > 0 ? -1 : 1);
     }
     return CAROM_OK;
@@ -129,7 +128,7 @@ static carom_status give_certificate(carom_contact_solver *c, const carom_contac
 static int count_degenerate(crm_island *s)
 {
     int n = 0;
-    crm_island_residual(s, s->best); /* leaves a and u */
+    if (!s->fresh) crm_island_residual(s, s->best); /* leaves a and u */
     for (int k = 0; k < s->nc; k++) {
         const double ln = s->best.n[k];
         const double bound = s->contact[k].mu * ln;
@@ -216,13 +215,15 @@ static carom_status solve(carom_contact_solver *c, const carom_contact_problem *
     s = crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, 6 * p->n_bodies + 1,
                     sizeof(double));
     if (s >= 0) s = crm_solver_prepare(c, p);
-    if (s >= 0) s = check_prescribed(c, p);
+    if (s < 0) return s;
+    const double speed = crm_contact_speed(p);
+    s = check_prescribed(c, p, speed);
     if (s >= 0) count(c, stats);
     for (int i = 0; i < c->graph.n_islands && s >= 0; i++)
         s = solve_island(c, p, i, use_guess, x, stats);
     if (s < 0) return s;
     write_solution(c, p, x);
-    stats->residual = crm_contact_residual(p, x, c->scratch);
+    stats->residual = crm_contact_residual(p, x, speed, c->scratch);
     return judge(&c->settings, stats->residual);
 }
 

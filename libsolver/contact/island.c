@@ -94,6 +94,7 @@ static double motion_error(const crm_island *s, crm_vec x, const double *defect)
 double crm_island_residual(crm_island *s, crm_vec x)
 {
     double error = 0;
+    s->fresh = 0;
     for (int k = 0; k < s->nc; k++) {
         const crm_contact *c = &s->contact[k];
         const double a = crm_dot(c->n, c->a, c->b, x.z) + c->cn;
@@ -131,6 +132,7 @@ int crm_island_offer(crm_island *s, crm_vec x, double r)
 {
     if (r < s->best_residual) {
         s->best_residual = r;
+        s->fresh = 1; /* callers measure, then offer */
         crm_vec_copy(s, s->best, x);
         memcpy(s->best_mode, s->mode, (size_t)s->nc);
     }

@@ -81,6 +81,7 @@ typedef struct crm_island {
     unsigned char *mode;         /* nc: carom_contact_mode */
     unsigned char *best_mode;
     double best_residual;
+    int fresh; /* an and ut belong to best */
     double accept;
     double inexact; /* a point this good ends the restarts early */
     int max_iterations;

@@ -2,6 +2,10 @@
 
 #include <math.h>
 
+/* Residual of guessed impulses that need no solve; far below `accept`, so that the solution stays a
+ * smooth function of the data, for differences too [1]. */
+#define GUESS_EXACT 1e-14
+
 enum {
     ROUNDS_TRY = 5,     /* of the active set from a guess */
     ROUNDS_POLISH = 8,  /* after the interior point */
@@ -67,11 +71,39 @@ static int try_modes(climb *c, carom_contact_stage stage)
     return done;
 }
 
+/* The equations and inequalities of contact k's mode hold at the point last measured. */
+static int mode_fits(const crm_island *s, int k)
+{
+    const double tiny = 10 * GUESS_EXACT;
+    const double ln = s->x.n[k];
+    const double bound = s->contact[k].mu * ln;
+    const double sign = crm_slip_sign(s->mode[k]);
+    if (s->mode[k] == CAROM_SEPARATED) return fabs(ln) <= tiny && s->an[k] >= -tiny;
+    if (!(fabs(s->an[k]) <= tiny && ln >= -tiny)) return 0;
+    if (sign != 0) return fabs(s->x.t[k] - sign * bound) <= tiny && sign * s->ut[k] <= tiny;
+    return fabs(s->ut[k]) <= tiny && fabs(s->x.t[k]) <= bound + tiny;
+}
+
+/* Guessed impulses that fit as they are: nothing has changed. */
+static int guess_is_exact(crm_island *s)
+{
+    const double r = crm_island_residual(s, s->x);
+    if (!(r <= GUESS_EXACT)) return 0;
+    for (int k = 0; k < s->nc; k++) {
+        if (mode_fits(s, k)) continue;
+        s->mode[k] = (unsigned char)crm_contact_mode_of(&s->contact[k], s->x.n[k], s->x.t[k],
+                                                        s->an[k], s->ut[k]);
+    }
+    return crm_island_offer(s, s->x, r);
+}
+
 static int try_active_sets(climb *c, int use_guess)
 {
     crm_island *s = c->s;
     if (use_guess && s->nc) {
         fit_guess(s);
+        *c->stage = CAROM_STAGE_GUESS;
+        if (use_guess == CAROM_GUESS_IMPULSES && guess_is_exact(s)) return 1;
         if (try_modes(c, CAROM_STAGE_GUESS)) return 1;
     }
     crm_vec_zero(s, s->x);

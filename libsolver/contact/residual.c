@@ -113,7 +113,7 @@ static double contact_error(const carom_contact_problem *p, const carom_contact_
 }
 
 double crm_contact_residual(const carom_contact_problem *p, const carom_contact_solution *x,
-                            double *scratch)
+                            double speed, double *scratch)
 {
     double rows = 0;
     for (int k = 0; k < p->n_contacts; k++) {
@@ -125,7 +125,7 @@ double crm_contact_residual(const carom_contact_problem *p, const carom_contact_
         rows = worst(rows, fabs(crm_row_times(p->je + 6 * r, p->joint_body + 2 * r, x->v) + c));
     }
     const double motion = motion_error(p, x, scratch, scratch + 3 * p->n_bodies);
-    const double error = worst(motion, rows / crm_contact_speed(p));
+    const double error = worst(motion, rows / speed);
     return error <= HUGE_VAL ? error : HUGE_VAL;
 }
 
@@ -135,7 +135,7 @@ double carom_contact_residual(const carom_contact_problem *problem, const carom_
     const size_t n = 6 * (size_t)problem->n_bodies;
     double *scratch = crm_new(&m, n, sizeof *scratch);
     if (!scratch) return HUGE_VAL;
-    const double error = crm_contact_residual(problem, x, scratch);
+    const double error = crm_contact_residual(problem, x, crm_contact_speed(problem), scratch);
     crm_free(&m, scratch, n, sizeof *scratch);
     return error;
 }

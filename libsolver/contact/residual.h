@@ -52,8 +52,8 @@ double crm_row_speed(const double *row, const int *body, const double *u, double
 /* V of (21) over all rows of the problem; 1 when there is no scale. */
 double crm_contact_speed(const carom_contact_problem *p);
 
-/* carom_contact_residual with scratch of 6 n_bodies doubles. */
+/* carom_contact_residual with V known and scratch of 6 n_bodies doubles. */
 double crm_contact_residual(const carom_contact_problem *p, const carom_contact_solution *x,
-                            double *scratch);
+                            double speed, double *scratch);
 
 #endif
