@@ -42,7 +42,7 @@ static double watch_value(const carom_world *w, const watch *x, const double *q,
     return x->opened ? gap / h : gap;
 }
 
-/* Fills g0 from q0: the gap, or where that is closed the speed at which it opens. */
+/* Fills g0 from q0: the gap, or of a closed pair that opens its speed. */
 static void watch_start(const carom_world *w, watch *x)
 {
     const crm_substep *s = &w->sub;
@@ -50,17 +50,22 @@ static void watch_start(const carom_world *w, watch *x)
     x->g0 = watch_gap(w, x, s->q0);
     if (x->g0 > slop) return;
     const carom_manifold m = crm_collide(w, x->pair, s->q0, slop);
-    x->opened = 1;
-    x->g0 = HUGE_VAL;
+    double opening = HUGE_VAL;
     for (int k = 0; k < m.count; k++) {
         double jn[6];
         double jt[6];
         const crm_contact c = crm_contact_of(w, x->pair, &m, k, s->q0);
         if (x->by_recipe && !crm_recipe_same(c.recipe, x->recipe)) continue;
         crm_contact_rows(&c, jn, jt);
-        x->g0 = fmin(x->g0, crm_row_dot(jn, s->v0, c.body_a, c.body_b));
+        opening = fmin(opening, crm_row_dot(jn, s->v0, c.body_a, c.body_b));
     }
-    if (!(x->g0 < HUGE_VAL)) x->g0 = 0;
+    if (!(opening > 0 && opening < HUGE_VAL)) {
+        /* A feature of a pair that touches there already is held by its other points. */
+        if (x->by_recipe) x->g0 = 0;
+        return;
+    }
+    x->opened = 1;
+    x->g0 = opening;
     x->g1 /= s->h * x->at;
 }
 

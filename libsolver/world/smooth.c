@@ -8,6 +8,10 @@
 static const double NEWTON_TOL = 1e-14;
 /* It converges linearly, by the turn of a body per sub-step; 30 allow for a turn of a third. */
 enum { MAX_NEWTON = 30 };
+/* Where it has not converged to within LOOSE of that, or a position is thrown farther than FAR [L],
+ * the sub-step is too long: there is no solution at this h. */
+static const double LOOSE = 1e3;
+static const double FAR = 1e2;
 
 /* Stage 1 aims at gap 0; from a deeper overlap it recovers at v_rest, not at gap / h, which in a
  * short sub-step would be a kick. */
@@ -97,15 +101,18 @@ static carom_status stage_1(carom_world *w, crm_substep *s)
     crm_free_velocity(w, s, s->v0, 0.5 * s->h);
     set_targets(w, s);
     first_sides(w, s, c);
+    double moved = 0;
     for (int k = 0; k < MAX_NEWTON; k++) {
         const carom_status e = crm_solve_run(w, s, c, 1);
         if (e < 0) return e;
         end_pose(w, s, c);
-        if (!s->n_contacts && !w->n_joints) break;
-        if (next_sides(w, s, c, &s->solve[1]) <= tol) break;
+        if (!s->n_contacts && !w->n_joints) return CAROM_OK;
+        moved = next_sides(w, s, c, &s->solve[1]);
+        if (moved <= tol) return CAROM_OK;
+        if (!(moved < FAR * w->length)) return CAROM_E_NO_SOLUTION;
         take_sides(w, s, &s->solve[1], c);
     }
-    return CAROM_OK;
+    return moved <= LOOSE * tol ? CAROM_OK : CAROM_E_NO_SOLUTION;
 }
 
 /* Stage 2 at q1: M v1 = M vh + h/2 f + J1' l with the contacts still closed and the joints at rest;
