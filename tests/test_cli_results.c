@@ -43,7 +43,7 @@ static void gradient_has_its_arrays(void **state)
     program_free(&c);
 }
 
-/* Loss and gradient of a free body in closed form: x(t) = x0 + t v0 + (F/m) t^2/2. */
+/* Loss and gradient of a free body in closed form: x_n = x0 + n h v0 + (F/m) h^2 n (n + 1)/2. */
 static void gradient_of_a_free_body(void **state)
 {
     (void)state;
@@ -54,7 +54,7 @@ static void gradient_of_a_free_body(void **state)
     program_write("free_loss.json", "{\"terms\":[{\"step\":4,\"body\":\"b\",\"component\":\"x\","
                                     "\"weight\":0.5,\"target\":1},{\"step\":0,\"body\":0,"
                                     "\"component\":\"vx\",\"weight\":7}]}");
-    const double s = 0.5;
+    const double s = 0.0625 * 10;
     const double x = 3 + 5 * s / 2;
     program_call c =
         program_run("gradient free.json --loss - --wrt v0,mass,q0,force <free_loss.json");

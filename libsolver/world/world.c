@@ -21,7 +21,7 @@ static carom_status check_settings(const carom_world_settings *s)
     const int bounded = s->dt < HUGE_VAL && s->margin < 1 && s->penetration < 1 &&
                         s->length < HUGE_VAL && s->rest_speed < HUGE_VAL;
     const int finite = isfinite(s->gravity[0]) && isfinite(s->gravity[1]);
-    const int words = s->integrator >= CAROM_LOCATED && s->integrator <= CAROM_EULER &&
+    const int words = s->integrator >= CAROM_EULER && s->integrator <= CAROM_LOCATED &&
                       s->combine_friction >= 0 && s->combine_friction <= CAROM_COMBINE_MAX &&
                       s->combine_restitution >= 0 && s->combine_restitution <= CAROM_COMBINE_MAX;
     return positive && bounded && finite && words && s->max_substeps >= 1 ? CAROM_OK

@@ -1,4 +1,5 @@
-/* carom::carom: one body falls; the default step is exact in free flight: y = -g t^2 / 2. */
+/* carom::carom: one body falls.  v <- v - g h, then y <- y + h v: after n steps
+ * y = -g h^2 n (n + 1) / 2. */
 #include <carom/carom.h>
 
 #include <math.h>
@@ -20,7 +21,7 @@ int main(void)
         if (carom_world_step(world, NULL, NULL) != CAROM_OK) return 1;
     y = carom_world_q(world)[2];
     carom_world_destroy(world);
-    expected = -10.0 * (n * settings.dt) * (n * settings.dt) / 2;
+    expected = -10.0 * settings.dt * settings.dt * n * (n + 1) / 2;
     printf("y = %.17g, expected %.17g\n", y, expected);
     return !(fabs(y - expected) < 1e-12); /* 60 additions of numbers below 6 */
 }

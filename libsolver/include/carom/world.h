@@ -19,8 +19,8 @@ typedef enum carom_body_type {
 } carom_body_type;
 
 typedef enum carom_integrator {
-    CAROM_LOCATED, /* second order, impacts located; Euler beyond 48 moving bodies: docs/step.md */
-    CAROM_EULER    /* the paper's step, corrected: docs/math/equations.md (1)-(7), (12), (14) */
+    CAROM_EULER,  /* the paper's step, corrected: docs/math/equations.md (1)-(7), (12), (14) */
+    CAROM_LOCATED /* second order; Euler beyond 48 moving bodies: docs/step.md */
 } carom_integrator;
 
 typedef enum carom_combine {
@@ -34,7 +34,7 @@ typedef enum carom_combine {
  * `--set` use these names (carom_world_settings_set). */
 #define CAROM_WORLD_SETTINGS(X)                                                                    \
     X(dt, double, 1.0 / 60, "s", "length of a step")                                               \
-    X(integrator, int, CAROM_LOCATED, "", "located or euler")                                      \
+    X(integrator, int, CAROM_EULER, "", "euler or located")                                        \
     X(combine_friction, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")                \
     X(combine_restitution, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")             \
     X(length, double, 0, "m", "length scale L; 0: largest diameter of a dynamic body's shape")     \
