@@ -351,32 +351,108 @@ static void doubled_hinge_has_redundant_rows(void **state)
     release(&p);
 }
 
-/* dv = J du is linear at a fixed active set: <v_bar, v(u + d) - v(u)> = <u_bar, d> to rounding. */
+/* A random direction of all data, into the arrays of d; 0 where no derivative is defined. */
+static void random_direction(const contact_case *c, rng *r, gradient *d)
+{
+    double *const arrays[] = {d->inv_mass, d->u, d->jn, d->jt, d->mu, d->cn, d->ct, d->je, d->ce};
+    const int nb = 3 * c->p.n_bodies;
+    const int nc = c->p.n_contacts;
+    const int ne = c->p.n_joint_rows;
+    const int n[] = {nb, nb, 6 * nc, 6 * nc, nc, nc, nc, 6 * ne, ne};
+    for (int k = 0; k < 9; k++) {
+        for (int i = 0; i < n[k]; i++) arrays[k][i] = rng_uniform(r, -1, 1);
+    }
+    for (int k = 0; k < nc; k++) {
+        if (c->mu[k] == 0) d->mu[k] = 0;
+    }
+    for (int i = 0; i < nb; i++) {
+        if (c->inv_mass[i] == 0) d->inv_mass[i] = 0;
+    }
+}
+
+static double inner(int n, const double *x, const double *y)
+{
+    double s = 0;
+    for (int i = 0; i < n; i++) s += x[i] * y[i];
+    return s;
+}
+
+static carom_contact_direction direction_of(const gradient *d)
+{
+    return (carom_contact_direction){d->inv_mass, d->u,  d->jn, d->jt, d->mu,
+                                     d->cn,       d->ct, d->je, d->ce};
+}
+
+/* <v_bar, J d> = <J' v_bar, d>, with both sides computed apart. */
 static void transposed_identity(void **state)
 {
     (void)state;
     int n = 0;
-    for (uint64_t seed = 0; n < 20; seed++) {
+    for (uint64_t seed = 0; n < 40; seed++) {
         rng r = rng_from(500 + seed);
         probe p;
         gradient g;
+        gradient d;
+        double dv[64];
         p.c = make_random(&r);
         if (solve_base(&p, &r) && nondegenerate(&p.c)) {
+            const contact_case *c = &p.c;
+            const int nb = 3 * c->p.n_bodies;
+            const int nc = c->p.n_contacts;
+            const int ne = c->p.n_joint_rows;
             find_gradient(&p, &g);
-            const double before = loss(&p);
-            double expected = 0;
-            for (int i = 0; i < 15; i++) {
-                const double d = 1e-3 * rng_uniform(&r, -1, 1);
-                p.c.u[i] += d;
-                expected += d * g.u[i];
-            }
-            const double after = loss(&p);
-            /* Two solves to 1e-15 of velocities of order 1, conditioned to 1e2. */
-            assert_near(after - before, expected, 1e-12);
+            random_direction(c, &r, &d);
+            const carom_contact_direction direction = direction_of(&d);
+            assert_int_equal(carom_contact_tangent(p.solver, &c->p, &c->x, &direction, dv),
+                             CAROM_OK);
+            const double backward = inner(nb, g.inv_mass, d.inv_mass) + inner(nb, g.u, d.u) +
+                                    inner(6 * nc, g.jn, d.jn) + inner(6 * nc, g.jt, d.jt) +
+                                    inner(nc, g.mu, d.mu) + inner(nc, g.cn, d.cn) +
+                                    inner(nc, g.ct, d.ct) + inner(6 * ne, g.je, d.je) +
+                                    inner(ne, g.ce, d.ce);
+            /* Sums of a hundred terms of up to 1e2. */
+            assert_near(inner(nb, p.bar, dv), backward, 1e-11 * (1 + fabs(backward)));
             n++;
         }
         release(&p);
     }
+}
+
+/* dv of each unit direction of u, and along mu, against differences of the solve. */
+static void tangent_agrees_with_differences(void **state)
+{
+    (void)state;
+    rng r = rng_from(77);
+    probe p;
+    do {
+        p.c = make_random(&r);
+        if (solve_base(&p, &r) && nondegenerate(&p.c)) break;
+        release(&p);
+    } while (1);
+    contact_case *c = &p.c;
+    for (int i = 0; i < 15 + c->p.n_contacts; i++) {
+        double unit[64] = {0};
+        double dv[64];
+        double error;
+        const int k = i - 15;
+        if (k >= 0 && c->mu[k] == 0) continue;
+        unit[k < 0 ? i : k] = 1;
+        const carom_contact_direction d =
+            k < 0 ? (carom_contact_direction){.u = unit} : (carom_contact_direction){.mu = unit};
+        loss(&p);
+        assert_int_equal(carom_contact_tangent(p.solver, &c->p, &c->x, &d, dv), CAROM_OK);
+        const double expected =
+            fdiff_entry(loss, &p, k < 0 ? &c->u[i] : &c->mu[k], DIFFERENCE, &error);
+        assert_near_case("tangent", i, inner(15, p.bar, dv), expected,
+                         TOLERANCE * (1 + fabs(expected)) + error);
+    }
+    const carom_contact_direction none = {0};
+    double dv[64];
+    assert_int_equal(carom_contact_tangent(p.solver, &c->p, &c->x, &none, dv), CAROM_OK);
+    for (int i = 0; i < 15; i++) assert_near(dv[i], 0, 0);
+    c->x.mode[0] = CAROM_UNKNOWN;
+    assert_int_equal(carom_contact_tangent(p.solver, &c->p, &c->x, &none, dv), CAROM_E_ARGUMENT);
+    release(&p);
 }
 
 /* Nothing touches: the adjoint is the identity; unwanted arrays are left out. */
@@ -413,6 +489,7 @@ int main(void)
         cmocka_unit_test(box_at_rest_has_redundant_rows),
         cmocka_unit_test(doubled_hinge_has_redundant_rows),
         cmocka_unit_test(transposed_identity),
+        cmocka_unit_test(tangent_agrees_with_differences),
         cmocka_unit_test(free_bodies_pass_through),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -10,9 +10,6 @@
 #define DEFECT_SMALL 1e-11
 /* A mode is kept while it is violated by less, in unit scale [1]. */
 #define KEEP 1e-11
-/* Passes of one solve. */
-#define PASSES 12
-
 enum { MAX_ROUNDS = 32 };
 
 double crm_slip_sign(unsigned char mode)
@@ -147,7 +144,7 @@ int crm_active_set(crm_island *s, int rounds)
         for (int q = 0; q < i; q++) {
             if (seen[q] == seen[i]) return 0; /* cycles */
         }
-        crm_solve_modes(s, PASSES);
+        crm_solve_modes(s, CRM_PASSES);
         const double r = crm_island_residual(s, s->x);
         if (crm_island_offer(s, s->x, r)) return 1;
         if (!(r < HUGE_VAL)) return 0;

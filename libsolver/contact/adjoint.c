@@ -126,14 +126,6 @@ static void solve_scaled(crm_island *s, const double *g)
     }
 }
 
-static void set_modes(crm_island *s, const crm_graph *g, int island, const unsigned char *mode)
-{
-    for (int k = 0; k < s->nc; k++) {
-        s->mode[k] = mode[g->contact_of[g->contact_ptr[island] + k]];
-        if (!(s->contact[k].mu > 0) && s->mode[k] > CAROM_STICK) s->mode[k] = CAROM_STICK;
-    }
-}
-
 /* Adjoint of one island into the arrays of a. */
 static void solve_island(carom_contact_solver *c, const carom_contact_problem *p,
                          const unsigned char *mode, const double *v_bar, int island, adjoint *a)
@@ -142,7 +134,7 @@ static void solve_island(carom_contact_solver *c, const carom_contact_problem *p
     const crm_system *y = &c->system;
     crm_system_gather(&c->system, g, p, island);
     crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
-    set_modes(&s, g, island, mode);
+    crm_system_set_modes(g, &s, island, mode);
     double *bar = s.size;
     const double *root = y->root + 3 * g->node_ptr[island];
     const int *body_of = g->body_of + g->node_ptr[island];
@@ -163,13 +155,6 @@ static void solve_island(carom_contact_solver *c, const carom_contact_problem *p
     }
 }
 
-static void add_row(double *f, const double *row, const int *body, double l)
-{
-    for (int e = 0; e < 2; e++) {
-        for (int i = 0; body[e] >= 0 && i < 3; i++) f[3 * body[e] + i] += row[3 * e + i] * l;
-    }
-}
-
 /* f = J' l; and p = g - C' q where W = 0. */
 static void finish(const carom_contact_problem *p, const carom_contact_solution *x, adjoint *a,
                    double *cq)
@@ -178,16 +163,16 @@ static void finish(const carom_contact_problem *p, const carom_contact_solution 
     memset(cq, 0, 3 * (size_t)p->n_bodies * sizeof(double));
     for (int k = 0; k < p->n_contacts; k++) {
         const int *body = p->contact_body + 2 * k;
-        add_row(a->f, p->jn + 6 * k, body, x->ln[k]);
-        add_row(cq, p->jn + 6 * k, body, a->qn[k]);
+        crm_row_add(a->f, p->jn + 6 * k, body, x->ln[k]);
+        crm_row_add(cq, p->jn + 6 * k, body, a->qn[k]);
         if (!crm_has_friction(p, k)) continue;
-        add_row(a->f, p->jt + 6 * k, body, x->lt[k]);
-        add_row(cq, p->jt + 6 * k, body, a->qt[k]);
+        crm_row_add(a->f, p->jt + 6 * k, body, x->lt[k]);
+        crm_row_add(cq, p->jt + 6 * k, body, a->qt[k]);
     }
     for (int r = 0; r < p->n_joint_rows; r++) {
         const int *body = p->joint_body + 2 * r;
-        add_row(a->f, p->je + 6 * r, body, x->le[r]);
-        add_row(cq, p->je + 6 * r, body, a->qe[r]);
+        crm_row_add(a->f, p->je + 6 * r, body, x->le[r]);
+        crm_row_add(cq, p->je + 6 * r, body, a->qe[r]);
     }
     for (int i = 0; i < 3 * p->n_bodies; i++) {
         if (!(p->inv_mass[i] > 0)) a->p[i] -= cq[i];
@@ -243,14 +228,6 @@ static void write_bars(const carom_contact_problem *p, const carom_contact_solut
     }
 }
 
-static int modes_valid(const carom_contact_problem *p, const unsigned char *mode)
-{
-    for (int k = 0; k < p->n_contacts; k++) {
-        if (mode[k] > CAROM_SLIP_PLUS) return 0;
-    }
-    return 1;
-}
-
 /* 9 per body, 2 per contact, 1 per joint row. */
 static carom_status reserve_scratch(carom_contact_solver *c, const carom_contact_problem *p)
 {
@@ -265,7 +242,7 @@ carom_status carom_contact_adjoint(carom_contact_solver *solver,
 {
     const carom_contact_problem *p = problem;
     carom_status s = crm_contact_check(p);
-    if (s >= 0 && !modes_valid(p, x->mode)) s = CAROM_E_ARGUMENT;
+    if (s >= 0 && !crm_modes_valid(p, x->mode)) s = CAROM_E_ARGUMENT;
     if (s >= 0) s = reserve_scratch(solver, p);
     if (s >= 0) s = crm_solver_prepare(solver, p);
     if (s < 0) return s;

@@ -76,3 +76,11 @@ carom_status crm_contact_check(const carom_contact_problem *p)
         return CAROM_E_ARGUMENT;
     return CAROM_OK;
 }
+
+int crm_modes_valid(const carom_contact_problem *p, const unsigned char *mode)
+{
+    for (int k = 0; k < p->n_contacts; k++) {
+        if (mode[k] > CAROM_SLIP_PLUS) return 0;
+    }
+    return 1;
+}

@@ -11,4 +11,7 @@
  * CAROM_E_CAPACITY: a count above CRM_MAX_COUNT. */
 carom_status crm_contact_check(const carom_contact_problem *p);
 
+/* No mode of a solution is out of range. */
+int crm_modes_valid(const carom_contact_problem *p, const unsigned char *mode);
+
 #endif

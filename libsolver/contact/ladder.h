@@ -9,6 +9,8 @@
 int crm_active_set(crm_island *s, int rounds);
 /* Solves the equations of s->mode, starting from s->x, in `passes` proximal passes at most. */
 void crm_solve_modes(crm_island *s, int passes);
+/* Passes that leave rounding alone. */
+enum { CRM_PASSES = 12 };
 /* Responses of the equations of s->mode, with this compliance. */
 void crm_set_responses(crm_island *s, double compliance);
 /* Sign of the slip force of a mode, 0 when there is none. */

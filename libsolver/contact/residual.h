@@ -32,6 +32,14 @@ static inline double crm_row_times(const double *row, const int *body, const dou
     return s;
 }
 
+/* v += row' l. */
+static inline void crm_row_add(double *v, const double *row, const int *body, double l)
+{
+    for (int e = 0; e < 2; e++) {
+        for (int i = 0; body[e] >= 0 && i < 3; i++) v[3 * body[e] + i] += row[3 * e + i] * l;
+    }
+}
+
 /* row diag(W) row', the inverse mass that the row feels. */
 static inline double crm_row_weight(const double *row, const int *body, const double *inv_mass)
 {

@@ -286,6 +286,14 @@ void crm_system_read(const crm_system *y, const crm_graph *g, crm_island *s, int
     memcpy(s->x.z, s->rest.z, 3 * (size_t)s->nb * sizeof(double));
 }
 
+void crm_system_set_modes(const crm_graph *g, crm_island *s, int island, const unsigned char *mode)
+{
+    for (int k = 0; k < s->nc; k++) {
+        s->mode[k] = mode[g->contact_of[g->contact_ptr[island] + k]];
+        if (!(s->contact[k].mu > 0) && s->mode[k] > CAROM_STICK) s->mode[k] = CAROM_STICK;
+    }
+}
+
 /* v = u + V sqrt(W) w.  Where w differs from J' l by rounding of the velocity scale, it becomes
  * J' l: no row can see the change, and (4) then holds for small terms too. */
 static void write_motion(const crm_system *y, const crm_graph *g, const carom_contact_problem *p,

@@ -48,6 +48,9 @@ crm_island crm_system_island(const crm_system *y, const crm_graph *g, const crm_
 void crm_system_read(const crm_system *y, const crm_graph *g, crm_island *s, int island,
                      const carom_contact_solution *x, int use_guess);
 
+/* s->mode from a solution's modes; closed frictionless contacts stick. */
+void crm_system_set_modes(const crm_graph *g, crm_island *s, int island, const unsigned char *mode);
+
 /* Writes the island's best point into the entries of the solution that belong to it. */
 void crm_system_write(const crm_system *y, const crm_graph *g, const carom_contact_problem *p,
                       const crm_island *s, int island, carom_contact_solution *x);

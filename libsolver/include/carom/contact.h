@@ -147,6 +147,26 @@ CAROM_API carom_status carom_contact_adjoint(carom_contact_solver *solver,
                                              const carom_contact_solution *x, const double *v_bar,
                                              carom_contact_bars *bars);
 
+/* Directions of the problem's data, shapes as in carom_contact_problem; NULL: zero. */
+typedef struct carom_contact_direction {
+    const double *inv_mass;
+    const double *u;
+    const double *jn;
+    const double *jt;
+    const double *mu;
+    const double *cn;
+    const double *ct;
+    const double *je;
+    const double *ce;
+} carom_contact_direction;
+
+/* Forward derivative at a solution and its modes: dv (3 n_bodies) is the change of v along the
+ * direction, the transpose of carom_contact_adjoint. */
+CAROM_API carom_status carom_contact_tangent(carom_contact_solver *solver,
+                                             const carom_contact_problem *problem,
+                                             const carom_contact_solution *x,
+                                             const carom_contact_direction *direction, double *dv);
+
 #ifdef __cplusplus
 }
 #endif
