@@ -1,5 +1,5 @@
 /* Order, pattern and factors of the block LU against a dense matrix. */
-#include "libsolver/contact/block_lu.h"
+#include "libsolver/contact/block/block_lu.h"
 
 #include "near.h"
 #include "rng.h"

@@ -2,7 +2,7 @@
  * Usage: bench_contact [csv | resting ROWS]   (the last for callgrind: one warm solve) */
 #include "carom/contact.h"
 #include "clock.h"
-#include "libsolver/contact/ladder.h"
+#include "libsolver/contact/ladder/ladder.h"
 #include "libsolver/contact/system.h"
 #include "rng.h"
 #include "scenes.h"

@@ -6,7 +6,7 @@
 #include "clock.h"
 #include "contact_families.h"
 #include "four_variables.h"
-#include "libsolver/contact/ladder.h"
+#include "libsolver/contact/ladder/ladder.h"
 #include "libsolver/contact/system.h"
 
 #include <math.h>

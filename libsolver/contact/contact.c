@@ -1,5 +1,5 @@
 #include "libsolver/contact/check.h"
-#include "libsolver/contact/ladder.h"
+#include "libsolver/contact/ladder/ladder.h"
 #include "libsolver/contact/residual.h"
 #include "libsolver/contact/solver.h"
 

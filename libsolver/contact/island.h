@@ -9,7 +9,7 @@
 #ifndef CRM_CONTACT_ISLAND_H
 #define CRM_CONTACT_ISLAND_H
 
-#include "libsolver/contact/block_lu.h"
+#include "libsolver/contact/block/block_lu.h"
 
 #include <float.h>
 

@@ -1,6 +1,6 @@
 #include "libsolver/contact/system.h"
 
-#include "libsolver/contact/ladder.h"
+#include "libsolver/contact/ladder/ladder.h"
 #include "libsolver/contact/residual.h"
 
 #include <float.h>

@@ -1,4 +1,4 @@
-#include "libsolver/contact/graph.h"
+#include "libsolver/contact/block/graph.h"
 
 /* Work of one analysis, behind the arrays of the graph in the same arena. */
 typedef struct work {

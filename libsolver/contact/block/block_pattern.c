@@ -1,4 +1,4 @@
-#include "libsolver/contact/block_lu.h"
+#include "libsolver/contact/block/block_lu.h"
 
 /* Work of one analysis; an island's part starts at 0 of each. */
 typedef struct work {

@@ -1,4 +1,4 @@
-#include "libsolver/contact/block_lu.h"
+#include "libsolver/contact/block/block_lu.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,4 +1,4 @@
-#include "libsolver/contact/ladder.h"
+#include "libsolver/contact/ladder/ladder.h"
 
 #include <math.h>
 

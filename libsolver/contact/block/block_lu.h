@@ -9,7 +9,7 @@
 #ifndef CRM_CONTACT_BLOCK_LU_H
 #define CRM_CONTACT_BLOCK_LU_H
 
-#include "libsolver/contact/graph.h"
+#include "libsolver/contact/block/graph.h"
 
 /* Order and pattern of all islands; block ids of an island: its nodes, then its groups. */
 typedef struct crm_block_pattern {

@@ -5,7 +5,7 @@
 #define CRM_CONTACT_GRAPH_H
 
 #include "carom/contact.h"
-#include "libsolver/contact/arena.h"
+#include "libsolver/contact/block/arena.h"
 
 /* Rows of a joint group: consecutive rows of one pair of bodies. */
 #define CRM_GROUP_ROWS 3
