@@ -247,9 +247,61 @@ static void every_situation(void **state)
     }
 }
 
+/* Pairs that random search found in earlier versions. */
+static void pairs_of_earlier_faults(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        double radius[2];
+        int n[2];
+        carom_pose pose[2];
+        carom_vec2 v[2][4];
+    } pairs[] = {
+        {"needles crossed: tied faces side by side, the foot on the second",
+         {0.2971669063067256, 0},
+         {3, 4},
+         {{-1.3238286934156376, 1.5554901371516232, -2.3145150440098075},
+          {3.8918287129382563, 1.2259162948382758, -2.6124770679368572}},
+         {{{0.11672561444377559, -0.49986436372594795},
+           {-0.21191156030224031, 0.90748751050136678},
+           {0.077072632345587033, -0.33005491141047566}},
+          {{-0.04458997493346549, -0.053116458618272654},
+           {-0.25717438921403907, -0.30635121065210369},
+           {-0.041967476623794062, -0.049992486858681552},
+           {0.18314133961391249, 0.21816158009885001}}}},
+        {"a segment square to a segment's end: the cut would be anywhere",
+         {1, 0},
+         {2, 2},
+         {{6.2831853071795862, 3, 0}, {-4.7123889803846897, -4, 1}},
+         {{{-3, -3}, {3, 3}}, {{-3, -3}, {3, 3}}}},
+        {"a tip on a tip, faces parallel",
+         {1, 1},
+         {4, 4},
+         {{0, 4, 0}, {0, -1, 0}},
+         {{{0, -3}, {3, 0}, {0, 3}, {-3, 0}}, {{0, -2}, {2, 0}, {0, 2}, {-2, 0}}}},
+    };
+    for (size_t k = 0; k < sizeof pairs / sizeof *pairs; k++) {
+        static body s[2];
+        worst top = {0, 0, 0};
+        for (int i = 0; i < 2; i++) {
+            s[i].shape.radius = pairs[k].radius[i];
+            s[i].shape.count = pairs[k].n[i];
+            s[i].shape.vertices = s[i].vertices;
+            s[i].pose = pairs[k].pose[i];
+            for (int j = 0; j < 4; j++) s[i].vertices[j] = pairs[k].v[i][j];
+        }
+        const carom_manifold m =
+            carom_collide(&s[0].shape, s[0].pose, &s[1].shape, s[1].pose, HUGE_VAL);
+        const char *fault = fault_in(&s[0], &s[1], &m, &top);
+        if (fault) fail_msg("%s: %s", pairs[k].name, fault);
+    }
+}
+
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(every_situation)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(every_situation),
+                                       cmocka_unit_test(pairs_of_earlier_faults)};
     if (argc > 1) n_pairs = atoi(argv[1]);
     if (argc > 2) seed = strtoull(argv[2], NULL, 10);
     verbose = argc > 1;

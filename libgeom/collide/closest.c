@@ -92,10 +92,7 @@ int crm_closest_from(const crm_placed *a, const crm_placed *b, crm_axis x, doubl
     return walk_from(a, b, x, h, length, NULL, out);
 }
 
-/* The foot of the vertex is on the face's edge, or the other shape's edge at that vertex lies along
- * the face.  Otherwise, with a height that is rounding, the shapes may be apart lengthwise: needles
- * and segments in line, end to end. */
-static int foot_on_face(const crm_placed *p, int k, const crm_placed *q, int j, double tol)
+int crm_foot_is_on(const crm_placed *p, int k, const crm_placed *q, int j, double tol)
 {
     const carom_vec2 e = crm_edge(p, k);
     const double length = crm_length(e);
@@ -138,7 +135,8 @@ static void leave_face(const crm_placed *a, const crm_placed *b, double reach, c
         const crm_axis x = {on_a ? m : crm_neg(m), face->a, face->b};
         const crm_closest known = *face;
         walk_from(a, b, x, face->gap, 1.0, &known, face);
-    } else if (face->gap >= -tol && !foot_on_face(p, k, q, j, tol)) {
+    } else if (face->gap >= -tol && !crm_foot_is_on(p, k, q, j, tol)) {
+        /* With a height that is rounding: needles and segments in line, end to end? */
         walk_lengthwise(a, b, reach, face);
     }
 }

@@ -71,6 +71,10 @@ int crm_is_lowest(const crm_placed *q, int j, carom_vec2 d, double length);
 int crm_face_is_closest(const crm_placed *p, int edge, const crm_placed *q, int j,
                         const crm_closest *c);
 
+/* The foot of the face's vertex is on its edge, or the other core's edge at that vertex lies along
+ * the face within tol and reaches over it. */
+int crm_foot_is_on(const crm_placed *p, int edge, const crm_placed *q, int j, double tol);
+
 /* The parts, in closest.c, walk.c, sweep.c and gjk.c. --------------------------------------- */
 
 /* A direction d with its support vertices: certified when d . (b - a) > 0, for then the line across
@@ -86,9 +90,9 @@ typedef struct crm_axis {
 int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closest *out);
 
 /* The face of largest separation, O(n_a + n_b); the distance when the cores overlap.  Of the faces
- * within 1e-14 of the coordinates of that, the first is taken, A's before B's.  x: any axis with
- * its support vertices, to begin with.  CRM_APART: a face separates by more than reach.  Not both
- * may be points. */
+ * within 1e-14 of the coordinates of that, the first with a foot on it is taken, A's before B's. x:
+ * any axis with its support vertices, to begin with.  CRM_APART: a face separates by more than
+ * reach.  Not both may be points. */
 void crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach,
                double slack, crm_closest *out);
 

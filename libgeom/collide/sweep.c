@@ -142,13 +142,15 @@ static void offer_faces(const faces *f, int on_b, double at_least, top *t)
     }
 }
 
-/* Of tied faces the first: the lowest index on A, else on B. */
+/* Of tied faces the first with a foot on it: the lowest index on A, else on B.  Without one the top
+ * stays: tied faces side by side are almost parallel. */
 static void first_of_tied(const faces *f, int on_b, double least, int *found, top *t)
 {
     const crm_placed *p = f->p;
     int low = f->vertex;
     for (int k = 0; p->n > 1 && !*found && k < p->n; k++) {
         if (!(height(f, k, &low) >= least)) continue;
+        if (!crm_foot_is_on(p, k, f->q, low, crm_noise(p, k, f->q, low))) continue;
         *found = 1;
         t->edge = k;
         t->vertex = low;

@@ -99,13 +99,7 @@ static double second_of(int n, const double *key, int at)
     return second;
 }
 
-static int first_above(int n, const double *key, double least)
-{
-    int k = 0;
-    while (k < n - 1 && !(key[k] >= least)) k++;
-    return k;
-}
-
+/* Face k of both cores' faces, A's first. */
 static void take_face(const crm_placed *a, const few *fa, const crm_placed *b, const few *fb, int k,
                       crm_closest *out)
 {
@@ -113,6 +107,28 @@ static void take_face(const crm_placed *a, const few *fa, const crm_placed *b, c
         crm_face_at(b, k - a->n, a, lowest_over(fb, k - a->n, fa), 1, out);
     } else {
         crm_face_at(a, k, b, lowest_over(fa, k, fb), 0, out);
+    }
+}
+
+static int has_foot(const crm_placed *a, const crm_placed *b, const crm_closest *c)
+{
+    const double tol = crm_noise(a, c->a, b, c->b);
+    return c->kind == CRM_FACE_A ? crm_foot_is_on(a, c->a, b, c->b, tol)
+                                 : crm_foot_is_on(b, c->b, a, c->a, tol);
+}
+
+/* Of tied faces the first with a foot on it.  Without one the top stays: tied faces side by side
+ * are almost parallel. */
+static void take_first(const crm_placed *a, const few *fa, const crm_placed *b, const few *fb,
+                       const double *key, double least, crm_closest *out)
+{
+    for (int k = 0; k < a->n + b->n; k++) {
+        crm_closest c;
+        if (!(key[k] >= least)) continue;
+        take_face(a, fa, b, fb, k, &c);
+        if (!has_foot(a, b, &c)) continue;
+        *out = c;
+        return;
     }
 }
 
@@ -141,12 +157,10 @@ void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_c
         return;
     }
     take_face(a, &fa, b, &fb, top, out);
-    /* Tied faces: the first of them. */
     const double second = second_of(n, key, top);
     const double least = out->gap - tie;
     if (second >= least * fabs(least)) {
-        const int k = first_above(n, key, least * fabs(least));
-        if (k != top) take_face(a, &fa, b, &fb, k, out);
+        take_first(a, &fa, b, &fb, key, least * fabs(least), out);
         out->tied = 1;
     } else {
         out->lead = out->gap - height_of(second);
