@@ -1,5 +1,5 @@
-/* carom::carom: one body falls.  v <- v - g h, then y <- y + h v: after n steps
- * y = -g h^2 n (n + 1) / 2. */
+/* carom::carom: one body falls for a second.  The default step is exact under constant force:
+ * y = -g t^2 / 2. */
 #include <carom/carom.h>
 
 #include <math.h>
@@ -11,7 +11,7 @@ int main(void)
     carom_world_settings settings = carom_world_defaults();
     const carom_body_def body = carom_body_defaults();
     carom_world *world = NULL;
-    double y, expected;
+    double y;
 
     settings.gravity[1] = -10.0;
     settings.dt = 1.0 / 60.0;
@@ -21,7 +21,6 @@ int main(void)
         if (carom_world_step(world, NULL, NULL) != CAROM_OK) return 1;
     y = carom_world_q(world)[2];
     carom_world_destroy(world);
-    expected = -10.0 * settings.dt * settings.dt * n * (n + 1) / 2;
-    printf("y = %.17g, expected %.17g\n", y, expected);
-    return !(fabs(y - expected) < 1e-12); /* 60 additions of numbers below 6 */
+    printf("y = %.17g\n", y);
+    return !(fabs(y + 5.0) < 1e-12); /* 60 additions of numbers below 6 */
 }
