@@ -5,6 +5,9 @@
 #include <stdarg.h>
 #include <stdio.h>
 
+/* Restarts of a contact problem.  A step has other ways on: without restitution, or in halves. */
+enum { WORLD_RESTARTS = 0 };
+
 carom_status crm_world_fail(carom_world *w, carom_status status, const char *format, ...)
 {
     va_list args;
@@ -43,6 +46,7 @@ carom_status carom_world_create(const carom_world_settings *settings,
     carom_contact_settings c = carom_contact_defaults();
     c.accept = chosen.accept;
     c.inexact = chosen.inexact;
+    c.max_restarts = WORLD_RESTARTS;
     carom_status e = carom_contact_create(&c, allocator, &w->solver);
     if (!e) e = carom_broadphase_create(allocator, &w->broadphase);
     if (!e) e = crm_reserve_bodies(w);
