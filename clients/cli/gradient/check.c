@@ -166,7 +166,7 @@ static double entry_scale(const checker *c, crm_wrt array, int index)
     case CRM_INERTIA: return c->p[array - CRM_MASS][index];
     case CRM_GRAVITY: return fmax(1, hypot(gravity[0], gravity[1]));
     case CRM_RADIUS:
-        return fmax(*shape_number(c->run->scene, array, index, &body), 1e-3 * c->length);
+        return fmax(*shape_number(c->run->scene, array, index, &body), 0.1 * c->length);
     case CRM_VERTICES:
     case CRM_ANCHORS: return c->length;
     case CRM_FORCE: return fmax(1, c->weight);
