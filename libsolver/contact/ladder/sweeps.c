@@ -114,20 +114,13 @@ static double sweep_group(crm_island *s, int q)
     return change;
 }
 
-/* Impulses travel from contact to contact in both directions. */
-static double sweep(crm_island *s, int back)
-{
-    double change = 0;
-    for (int i = 0; i < s->nc; i++)
-        change = fmax(change, sweep_contact(s, back ? s->nc - 1 - i : i));
-    for (int i = 0; i < s->ng; i++) change = fmax(change, sweep_group(s, back ? s->ng - 1 - i : i));
-    return change;
-}
-
 void crm_sweeps(crm_island *s, int n_sweeps)
 {
     for (int i = 0; i < n_sweeps; i++) {
-        if (sweep(s, i % 2) < SETTLED) break;
+        double change = 0;
+        for (int k = 0; k < s->nc; k++) change = fmax(change, sweep_contact(s, k));
+        for (int q = 0; q < s->ng; q++) change = fmax(change, sweep_group(s, q));
+        if (change < SETTLED) break;
     }
     crm_modes_at(s);
 }
