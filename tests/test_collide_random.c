@@ -185,9 +185,9 @@ static const char *fault_in(const body *a, const body *b, const carom_manifold *
     /* Along the normal the supports are as far apart as the shapes... */
     const long double h = collide_ref_support(&ra, &rb, n.x, n.y);
     if (!(fabsl(h - ref.distance) <= 2 * tol)) return "normal does not attain the distance";
-    /* ...and where it is unique, its error is rounding over the distance of the cores.  Below 1e-13
+    /* ...and where it is unique, its error is rounding over the distance of the cores.  Below 2e-14
      * of the coordinates (<= 4 sizes) that is no longer told from contact. */
-    const int clear = ref.gap > 4e-13L * ref.size;
+    const int clear = ref.gap > 8e-14L * ref.size;
     const int overlap = ref.gap < 0;
     if (clear) note(&top->normal, angle_of(n, &ref) * ref.gap, &ref);
     if (clear && !(angle_of(n, &ref) * ref.gap <= tol)) return "normal";
@@ -207,8 +207,8 @@ static const char *fault_in(const body *a, const body *b, const carom_manifold *
         const long double cb = collide_ref_outline(&rb, rb.at_x + p->arm_b.x + rb.radius * n.x,
                                                    rb.at_y + p->arm_b.y + rb.radius * n.y);
         note(&top->points, fmaxl(ca, cb), &ref);
-        /* A vertex past the end of the face by 1e-13 of the coordinates still counts as over it. */
-        const double past_end = tol + 4e-13 * (double)ref.size;
+        /* A vertex past the end of the face by 2e-14 of the coordinates still counts as over it. */
+        const double past_end = tol + 8e-14 * (double)ref.size;
         if (!(ca <= past_end)) return "point off A";
         if (!(cb <= past_end)) return "point off B";
         least = fmin(least, p->gap);

@@ -23,7 +23,7 @@ typedef struct crm_closest {
 } crm_closest;
 
 /* Distances below this are rounding [1], times the coordinates they come from [m]. */
-#define CRM_NEAR_TOL 1e-13
+#define CRM_NEAR_TOL 2e-14
 
 /* Heights of faces that differ by less are tied [1], times the coordinates [m]. */
 #define CRM_TIE_TOL 1e-14
