@@ -52,52 +52,13 @@ static int solve_inside(inside *o, const carom_contact_problem *p, int lemke)
     return 1;
 }
 
-static problem_triplets triplets(const double *rows, const int *body, int n, int n_bodies)
-{
-    problem_triplets t = {n, 3 * n_bodies, 0, NULL, NULL, NULL};
-    const size_t cap = 6 * (size_t)n + 1;
-    t.i = malloc(cap * sizeof(int));
-    t.j = malloc(cap * sizeof(int));
-    t.x = malloc(cap * sizeof(double));
-    for (int k = 0; k < 6 * n; k++) {
-        const int b = body[2 * (k / 6) + k % 6 / 3];
-        if (b < 0 || rows[k] == 0) continue;
-        t.i[t.n] = k / 6;
-        t.j[t.n] = 3 * b + k % 3;
-        t.x[t.n++] = rows[k];
-    }
-    return t;
-}
-
-static void free_triplets(problem_triplets *t)
-{
-    free(t->i);
-    free(t->j);
-    free(t->x);
-}
-
 /* The paper's method; its velocity and impulses are judged by the contact residual. */
 static int solve_plain(contact_case *c)
 {
     const carom_contact_problem *p = &c->p;
     const int nc = p->n_contacts;
-    problem_file f;
+    problem_file f = contact_case_to_file(c);
     four_variables v;
-    memset(&f, 0, sizeof f);
-    f.n_bodies = p->n_bodies;
-    f.n_contacts = nc;
-    f.n_joint_rows = p->n_joint_rows;
-    f.M = malloc((3 * (size_t)p->n_bodies + 1) * sizeof(double));
-    f.q = malloc((3 * (size_t)p->n_bodies + 1) * sizeof(double));
-    f.mu = c->mu;
-    f.c = c->cn;
-    for (int i = 0; i < 3 * p->n_bodies; i++) {
-        f.M[i] = 1 / p->inv_mass[i];
-        f.q[i] = -p->u[i] / p->inv_mass[i];
-    }
-    f.jc = triplets(p->jn, p->contact_body, nc, p->n_bodies);
-    f.jt = triplets(p->jt, p->contact_body, nc, p->n_bodies);
-    f.je = triplets(p->je, p->joint_body, p->n_joint_rows, p->n_bodies);
     int solved = 0;
     if (!four_variables_make(&f, &v)) {
         const carom_lcp_settings plain = carom_lcp_plain();
@@ -118,11 +79,7 @@ static int solve_plain(contact_case *c)
         free(z);
         four_variables_free(&v);
     }
-    free(f.M);
-    free(f.q);
-    free_triplets(&f.jc);
-    free_triplets(&f.jt);
-    free_triplets(&f.je);
+    contact_case_free_file(&f);
     return solved;
 }
 

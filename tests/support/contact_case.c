@@ -167,6 +167,67 @@ int contact_case_from_file(const problem_file *f, contact_case *c)
     return 0;
 }
 
+static problem_triplets triplets(const double *rows, const int *body, int n, int n_bodies)
+{
+    problem_triplets t = {n, 3 * n_bodies, 0, NULL, NULL, NULL};
+    const size_t most = 6 * (size_t)n + 1;
+    t.i = malloc(most * sizeof(int));
+    t.j = malloc(most * sizeof(int));
+    t.x = malloc(most * sizeof(double));
+    for (int k = 0; k < 6 * n; k++) {
+        const int b = body[2 * (k / 6) + k % 6 / 3];
+        if (b < 0 || rows[k] == 0) continue;
+        t.i[t.n] = k / 6;
+        t.j[t.n] = 3 * b + k % 3;
+        t.x[t.n++] = rows[k];
+    }
+    return t;
+}
+
+static double *copy_of(const double *x, int n)
+{
+    double *y = malloc(((size_t)n + 1) * sizeof *y);
+    if (n) memcpy(y, x, (size_t)n * sizeof *y);
+    return y;
+}
+
+problem_file contact_case_to_file(const contact_case *c)
+{
+    const carom_contact_problem *p = &c->p;
+    problem_file f;
+    memset(&f, 0, sizeof f);
+    f.n_bodies = p->n_bodies;
+    f.n_contacts = p->n_contacts;
+    f.n_joint_rows = p->n_joint_rows;
+    f.M = copy_of(c->inv_mass, 3 * p->n_bodies);
+    f.q = copy_of(c->u, 3 * p->n_bodies);
+    f.mu = copy_of(c->mu, p->n_contacts);
+    f.c = copy_of(c->cn, p->n_contacts);
+    for (int i = 0; i < 3 * p->n_bodies; i++) {
+        f.M[i] = 1 / f.M[i];
+        f.q[i] *= -f.M[i];
+    }
+    f.jc = triplets(p->jn, p->contact_body, p->n_contacts, p->n_bodies);
+    f.jt = triplets(p->jt, p->contact_body, p->n_contacts, p->n_bodies);
+    f.je = triplets(p->je, p->joint_body, p->n_joint_rows, p->n_bodies);
+    return f;
+}
+
+void contact_case_free_file(problem_file *f)
+{
+    problem_triplets *const t[] = {&f->jc, &f->jt, &f->je};
+    for (int k = 0; k < 3; k++) {
+        free(t[k]->i);
+        free(t[k]->j);
+        free(t[k]->x);
+    }
+    free(f->M);
+    free(f->q);
+    free(f->mu);
+    free(f->c);
+    memset(f, 0, sizeof *f);
+}
+
 typedef long double real;
 
 /* row . x */

@@ -42,6 +42,11 @@ int contact_case_hinge(contact_case *c, int a, int b, const double *ra, const do
 /* -1 when a row of the file involves more than two bodies. */
 int contact_case_from_file(const problem_file *f, contact_case *c);
 
+/* The same problem in the form of a file, c_t = c_e = 0 and W > 0 required; free it with
+ * contact_case_free_file (problem_file.c needs jansson, this does not). */
+problem_file contact_case_to_file(const contact_case *c);
+void contact_case_free_file(problem_file *f);
+
 /* The residual of x: the four parts of docs/math/equations.md (22), largest first. */
 double contact_case_residual(const contact_case *c);
 

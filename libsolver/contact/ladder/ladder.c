@@ -126,14 +126,11 @@ static double estimate_multiplier(crm_island *s)
     return fmin(1e8, fmax(10, l));
 }
 
+/* The polish also follows an accepted point: it makes complementarity exact. */
 static int try_interior(climb *c, carom_contact_stage stage, crm_interior_start start)
 {
-    if (crm_interior_point(c->s, start)) {
-        *c->unpolished = c->s->best_residual;
-        *c->stage = stage;
-        return 1;
-    }
-    return polish(c, stage, ROUNDS_POLISH);
+    const int done = crm_interior_point(c->s, start);
+    return polish(c, stage, done ? 1 : ROUNDS_POLISH) || done;
 }
 
 /* A bout of sweeps from where the last one ended, then the interior point from there. */

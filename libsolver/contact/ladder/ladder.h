@@ -1,5 +1,5 @@
-/* ladder.h: the methods tried on an island, docs/math/equations.md section 3.  Each improves
- * s->best and returns whether it is accepted. */
+/* ladder.h: the methods tried on an island, docs/contact.md.  Each improves s->best and returns
+ * whether it is accepted. */
 #ifndef CRM_CONTACT_LADDER_H
 #define CRM_CONTACT_LADDER_H
 
@@ -31,8 +31,8 @@ typedef struct crm_interior_start {
 /* Condensed Mehrotra interior point; leaves its best point in s->x. */
 int crm_interior_point(crm_island *s, crm_interior_start start);
 
-/* Projected Gauss-Seidel over contacts and joint groups, to and fro, from s->x (with z = J' l),
- * where it leaves its point and the natural modes. */
+/* Projected Gauss-Seidel over contacts and joint groups, from s->x (with z = J' l), where it leaves
+ * its point and the natural modes. */
 void crm_sweeps(crm_island *s, int n_sweeps);
 
 /* Lemke's method on the natural map with sparse factors: contacts pushed apart by tau, from where
