@@ -18,6 +18,8 @@
 /* A point is nondegenerate when nothing that decides a mode is closer to zero than this. */
 #define MARGIN 0.02
 
+static const double UP[2] = {0, 1};
+
 typedef struct probe {
     contact_case c;
     carom_contact_solver *solver;
@@ -258,8 +260,6 @@ static void immovable_bodies_have_a_gradient(void **state)
     release(&p);
 }
 
-static const double UP[2] = {0, 1};
-
 /* Moves the first numbers of both of two equal rows. */
 typedef struct twin {
     probe *p;
@@ -418,6 +418,47 @@ static void transposed_identity(void **state)
     }
 }
 
+/* A stack that slides under a top 1 to 1e8 times as heavy: u_bar against each column of the
+ * tangent. Both solve K or K' to rounding, conditioned to 1e8 at worst. */
+static void heavy_tops_keep_their_gradient(void **state)
+{
+    (void)state;
+    const double tops[] = {1, 1e4, 1e6, 1e8};
+    enum { N = 20 };
+    for (int q = 0; q < 4; q++) {
+        rng r = rng_from(41);
+        contact_case c = contact_case_new(N, 2 * N, 0);
+        carom_contact_solver *s;
+        double bar[3 * N];
+        double u_bar[3 * N];
+        for (int i = 0; i < N; i++) {
+            const double m = i == N - 1 ? tops[q] : 1;
+            contact_case_body(&c, i, m, m / 6, 0, 0.02 * (i * 7 % 5 - 2), -0.0981);
+            for (int e = -1; e <= 1; e += 2) {
+                const double low[2] = {0.5 * e + 0.01 * (i % 3), 0.5};
+                const double high[2] = {0.5 * e, -0.5};
+                contact_case_contact(&c, i - 1, i, low, high, UP, 0.5, 0);
+            }
+        }
+        assert_int_equal(carom_contact_create(NULL, NULL, &s), CAROM_OK);
+        assert_int_equal(carom_contact_solve(s, &c.p, CAROM_GUESS_NONE, &c.x, NULL), CAROM_OK);
+        for (int i = 0; i < 3 * N; i++) bar[i] = rng_uniform(&r, -1, 1);
+        carom_contact_bars bars = {.u = u_bar};
+        assert_int_equal(carom_contact_adjoint(s, &c.p, &c.x, bar, &bars), CAROM_OK);
+        for (int j = 0; j < 3 * N; j++) {
+            double unit[3 * N] = {0};
+            double dv[3 * N];
+            unit[j] = 1;
+            const carom_contact_direction d = {.u = unit};
+            assert_int_equal(carom_contact_tangent(s, &c.p, &c.x, &d, dv), CAROM_OK);
+            assert_near_case("u_bar", j, u_bar[j], inner(3 * N, bar, dv),
+                             1e-15 * fmax(1e3, tops[q]));
+        }
+        carom_contact_destroy(s);
+        contact_case_free(&c);
+    }
+}
+
 /* dv of each unit direction of u, and along mu, against differences of the solve. */
 static void tangent_agrees_with_differences(void **state)
 {
@@ -489,6 +530,7 @@ int main(void)
         cmocka_unit_test(box_at_rest_has_redundant_rows),
         cmocka_unit_test(doubled_hinge_has_redundant_rows),
         cmocka_unit_test(transposed_identity),
+        cmocka_unit_test(heavy_tops_keep_their_gradient),
         cmocka_unit_test(tangent_agrees_with_differences),
         cmocka_unit_test(free_bodies_pass_through),
     };

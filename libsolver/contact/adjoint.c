@@ -5,14 +5,10 @@
 
 #include <math.h>
 
-/* Compliance of active rows in unit scale: the proximal term [1]. */
-#define PROXIMAL 1e-9
 /* Passes stop when the defect, relative to the cotangent, is below this [1] ... */
 #define DEFECT_DONE 1e-15
 /* ... or, below this, no longer halves. */
 #define DEFECT_SMALL 1e-11
-
-enum { PASSES = 12 };
 
 /* The equations at the active set, with B = [J_n' + s mu J_t' (slip), J_t' (stick), J_e'] and
  * C = [J_n; J_t (stick); J_e], are  v - u - W B l = 0,  C v + c = 0.  Their adjoint is
@@ -92,18 +88,18 @@ static double find_defect(crm_island *s, const double *g)
 }
 
 /* One proximal pass: dp + C' dq = rhs.z, -B' dp + delta dq = rhs.n, rhs.t; s->x += (dp, dq). */
-static void improve(crm_island *s)
+static void improve(crm_island *s, double compliance)
 {
     double *z = s->step.z;
     memcpy(z, s->rhs.z, 3 * (size_t)(s->nb + s->ng) * sizeof(double));
-    for (int k = 0; k < s->nc; k++) spread(s, k, -1 / PROXIMAL, s->rhs.n[k], s->rhs.t[k], z);
+    for (int k = 0; k < s->nc; k++) spread(s, k, -1 / compliance, s->rhs.n[k], s->rhs.t[k], z);
     crm_island_solve_transposed(s, z);
     for (int k = 0; k < s->nc; k++) {
         double bn;
         double bt;
         project(s, k, z, &bn, &bt);
-        s->step.n[k] = (s->rhs.n[k] + bn) / PROXIMAL;
-        s->step.t[k] = (s->rhs.t[k] + bt) / PROXIMAL;
+        s->step.n[k] = (s->rhs.n[k] + bn) / compliance;
+        s->step.t[k] = (s->rhs.t[k] + bt) / compliance;
     }
     crm_vec_add(s, s->x, 1, s->step);
 }
@@ -116,13 +112,21 @@ static void solve_scaled(crm_island *s, const double *g)
     for (int i = 0; i < 3 * s->nb; i++) size = fmax(size, fabs(g[i]));
     crm_vec_zero(s, s->x);
     if (!(size > 0)) return;
-    crm_set_responses(s, PROXIMAL);
-    crm_island_factor(s, 1, PROXIMAL);
-    for (int i = 0; i < PASSES; i++) {
+    double compliance = CRM_COMPLIANCE;
+    crm_set_responses(s, compliance);
+    crm_island_factor(s, 1, compliance);
+    for (int i = 0; i < CRM_PASSES; i++) {
         const double e = find_defect(s, g) / size;
-        if (e < DEFECT_DONE || (e >= 0.5 * last && e < DEFECT_SMALL)) break;
+        if (compliance > CRM_COMPLIANCE_TIGHT && i >= CRM_PATIENCE && e > CRM_SLOW * last) {
+            compliance = CRM_COMPLIANCE_TIGHT;
+            crm_set_responses(s, compliance);
+            crm_island_factor(s, 1, compliance);
+        } else if (e >= 0.5 * last && e < DEFECT_SMALL) {
+            break;
+        }
+        if (e < DEFECT_DONE) break;
         last = fmin(e, last);
-        improve(s);
+        improve(s, compliance);
     }
 }
 

@@ -2,8 +2,6 @@
 
 #include <math.h>
 
-/* Compliance of an active row in unit scale: the proximal term [1]. */
-#define PROXIMAL 1e-10
 /* Passes stop when the defect is below this [1] ... */
 #define DEFECT_DONE 4e-15
 /* ... or, below this, no longer halves. */
@@ -71,18 +69,29 @@ static double find_defect(crm_island *s, int settle)
     return e;
 }
 
+static void factor_modes(crm_island *s, double compliance)
+{
+    crm_set_responses(s, compliance);
+    crm_island_factor(s, 1, compliance);
+}
+
 /* [I -B; C delta I] (dw, dl) = defect, repeated: the proximal point iteration, which converges to
- * the exact solution where rows are independent and to a consistent one where they are not. */
+ * the exact solution where rows are independent and to a consistent one where they are not.  It
+ * contracts by delta / (delta + sigma^2), sigma the smallest singular value: where masses differ
+ * widely that is slow, and a smaller delta pays, at less accuracy of each pass. */
 void crm_solve_modes(crm_island *s, int passes)
 {
     set_multipliers(s);
-    crm_set_responses(s, PROXIMAL);
-    crm_island_factor(s, 1, PROXIMAL);
+    factor_modes(s, CRM_COMPLIANCE);
     double last = HUGE_VAL;
     int settle = 0;
+    int tight = 0;
     for (int i = 0; i < passes; i++) {
         double e = find_defect(s, settle);
-        if (e >= 0.5 * last && !settle) {
+        if (!tight && i >= CRM_PATIENCE && e > CRM_SLOW * last && e > DEFECT_SMALL) {
+            tight = 1;
+            factor_modes(s, CRM_COMPLIANCE_TIGHT);
+        } else if (e >= 0.5 * last && !settle) {
             settle = 1;
             e = find_defect(s, settle);
         } else if (e >= 0.5 * last && e < DEFECT_SMALL) {

@@ -9,8 +9,13 @@
 int crm_active_set(crm_island *s, int rounds);
 /* Solves the equations of s->mode, starting from s->x, in `passes` proximal passes at most. */
 void crm_solve_modes(crm_island *s, int passes);
-/* Passes that leave rounding alone. */
-enum { CRM_PASSES = 12 };
+/* Passes that leave rounding alone; after CRM_PATIENCE of them, contraction by less than CRM_SLOW
+ * takes the tight compliance. */
+enum { CRM_PASSES = 12, CRM_PATIENCE = 2 };
+#define CRM_SLOW 0.1
+/* Compliance of active rows in unit scale, the proximal term [1]. */
+#define CRM_COMPLIANCE       1e-10
+#define CRM_COMPLIANCE_TIGHT 1e-13
 /* Responses of the equations of s->mode, with this compliance. */
 void crm_set_responses(crm_island *s, double compliance);
 /* Sign of the slip force of a mode, 0 when there is none. */
