@@ -7,8 +7,11 @@
 
 /* Passes stop when the defect, relative to the cotangent, is below this [1] ... */
 #define DEFECT_DONE 1e-15
-/* ... or, below this, no longer halves. */
+/* ... or, below this, no longer falls. */
 #define DEFECT_SMALL 1e-11
+
+#define WIDE 10
+enum { EXTRA = 2 };
 
 /* The equations at the active set, with B = [J_n' + s mu J_t' (slip), J_t' (stick), J_e'] and
  * C = [J_n; J_t (stick); J_e], are  v - u - W B l = 0,  C v + c = 0.  Their adjoint is
@@ -104,8 +107,9 @@ static void improve(crm_island *s, double compliance)
     crm_vec_add(s, s->x, 1, s->step);
 }
 
-/* Scaled adjoint of an island: p in s->x.z, q in s->x.n, s->x.t and behind the bodies. */
-static void solve_scaled(crm_island *s, const double *g)
+/* Scaled adjoint of an island: p in s->x.z, q in s->x.n, s->x.t and behind the bodies.  `extra`
+ * passes follow the one that reached rounding of g. */
+static void solve_scaled(crm_island *s, const double *g, int extra)
 {
     double size = 0;
     double last = HUGE_VAL;
@@ -117,17 +121,31 @@ static void solve_scaled(crm_island *s, const double *g)
     crm_island_factor(s, 1, compliance);
     for (int i = 0; i < CRM_PASSES; i++) {
         const double e = find_defect(s, g) / size;
-        if (compliance > CRM_COMPLIANCE_TIGHT && i >= CRM_PATIENCE && e > CRM_SLOW * last) {
+        const int done = e < DEFECT_DONE || (e >= last && e < DEFECT_SMALL);
+        if (done && extra-- == 0) break;
+        if (!done && compliance > CRM_COMPLIANCE_TIGHT && i >= CRM_PATIENCE &&
+            e > CRM_SLOW * last) {
             compliance = CRM_COMPLIANCE_TIGHT;
             crm_set_responses(s, compliance);
             crm_island_factor(s, 1, compliance);
-        } else if (e >= 0.5 * last && e < DEFECT_SMALL) {
-            break;
         }
-        if (e < DEFECT_DONE) break;
         last = fmin(e, last);
         improve(s, compliance);
     }
+}
+
+/* Where sqrt(W) spans more than WIDE, p = p^ / sqrt(W) of the heavy bodies needs more digits than
+ * the size of g^ shows; their rows have them, since both of their terms are small. */
+static int masses_differ(const crm_island *s, const double *root)
+{
+    double least = HUGE_VAL;
+    double largest = 0;
+    for (int i = 0; i < 3 * s->nb; i++) {
+        if (!(root[i] > 0)) continue;
+        least = fmin(least, root[i]);
+        largest = fmax(largest, root[i]);
+    }
+    return largest > WIDE * least;
 }
 
 /* Adjoint of one island into the arrays of a. */
@@ -140,10 +158,11 @@ static void solve_island(carom_contact_solver *c, const carom_contact_problem *p
     crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
     crm_system_set_modes(g, &s, island, mode);
     double *bar = s.size;
+    const int extra = masses_differ(&s, y->root + 3 * g->node_ptr[island]) ? EXTRA : 0;
     const double *root = y->root + 3 * g->node_ptr[island];
     const int *body_of = g->body_of + g->node_ptr[island];
     for (int i = 0; i < 3 * s.nb; i++) bar[i] = root[i] * v_bar[3 * body_of[i / 3] + i % 3];
-    solve_scaled(&s, bar);
+    solve_scaled(&s, bar, extra);
     for (int i = 0; i < 3 * s.nb; i++) {
         if (root[i] > 0) a->p[3 * body_of[i / 3] + i % 3] = s.x.z[i] / root[i];
     }
