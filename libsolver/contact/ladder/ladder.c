@@ -187,7 +187,7 @@ static int try_harder(climb *c)
     if (try_interior(c, CAROM_STAGE_INTERIOR_POINT, second)) return 1;
     if (try_interior(c, CAROM_STAGE_INTERIOR_POINT, third)) return 1;
     if (try_sweeps(c, 0) || try_lemke(c)) return 1;
-    for (int bout = 1; bout < N_BOUTS; bout++) {
+    for (int bout = 1; c->s->max_restarts && bout < N_BOUTS; bout++) {
         if (try_sweeps(c, bout)) return 1;
         if (c->s->best_residual <= c->s->inexact) break;
     }
