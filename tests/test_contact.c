@@ -445,6 +445,13 @@ static void bad_input_is_refused(void **state)
     c.x.mode[0] = CAROM_UNKNOWN;
     assert_int_equal(carom_contact_adjoint(s, &c.p, &c.x, c.u, &(carom_contact_bars){0}),
                      CAROM_E_ARGUMENT);
+    carom_contact_solution missing = c.x;
+    missing.le = NULL;
+    assert_int_equal(carom_contact_solve(s, &c.p, 0, &missing, NULL), CAROM_E_ARGUMENT);
+    assert_int_equal(carom_contact_solve(s, &c.p, 0, NULL, NULL), CAROM_E_ARGUMENT);
+    assert_int_equal(carom_contact_solve(s, NULL, 0, &c.x, NULL), CAROM_E_ARGUMENT);
+    assert_int_equal(carom_contact_solve(NULL, &c.p, 0, &c.x, NULL), CAROM_E_ARGUMENT);
+    assert_int_equal(carom_contact_adjoint(s, &c.p, &c.x, NULL, NULL), CAROM_E_ARGUMENT);
     c.p.n_contacts = -1;
     assert_int_equal(carom_contact_solve(s, &c.p, 0, &c.x, NULL), CAROM_E_ARGUMENT);
     carom_contact_destroy(s);
@@ -466,6 +473,9 @@ static void settings_are_checked(void **state)
     assert_int_equal(carom_contact_create(&set, NULL, &s), CAROM_E_ARGUMENT);
     set = carom_contact_defaults();
     set.max_restarts = -1;
+    assert_int_equal(carom_contact_create(&set, NULL, &s), CAROM_E_ARGUMENT);
+    set = carom_contact_defaults();
+    set.threads = 0;
     assert_int_equal(carom_contact_create(&set, NULL, &s), CAROM_E_ARGUMENT);
     assert_int_equal(carom_contact_create(NULL, NULL, NULL), CAROM_E_ARGUMENT);
     assert_null(s);
@@ -527,6 +537,46 @@ static void repeats_bit_for_bit(void **state)
     contact_case_free(&c);
     contact_case_free(&d);
     contact_case_free(&other);
+}
+
+/* Threads take islands in any order: the result, its statistics and a certificate are the same. */
+static void threads_do_not_matter(void **state)
+{
+    (void)state;
+    contact_case one = make_mixed(21, 200);
+    carom_contact_stats first;
+    for (int threads = 1; threads <= 4; threads++) {
+        contact_case c = contact_case_copy(&one);
+        carom_contact_settings set = carom_contact_defaults();
+        carom_contact_solver *s;
+        carom_contact_stats st;
+        set.threads = threads;
+        assert_int_equal(carom_contact_create(&set, NULL, &s), CAROM_OK);
+        assert_int_equal(carom_contact_solve(s, &c.p, CAROM_GUESS_NONE, &c.x, &st), CAROM_OK);
+        assert_true(st.islands > 100);
+        if (threads == 1) {
+            first = st;
+            memcpy(one.x.v, c.x.v, 3 * (size_t)c.p.n_bodies * sizeof(double));
+            memcpy(one.x.ln, c.x.ln, (size_t)c.p.n_contacts * sizeof(double));
+        }
+        assert_memory_equal(c.x.v, one.x.v, 3 * (size_t)c.p.n_bodies * sizeof(double));
+        assert_memory_equal(c.x.ln, one.x.ln, (size_t)c.p.n_contacts * sizeof(double));
+        assert_int_equal(st.factorizations, first.factorizations);
+        assert_int_equal(st.stage, first.stage);
+        assert_int_equal(st.degenerate, first.degenerate);
+        const int last = c.p.n_joint_rows - 1;
+        c.joint_body[2 * last] = -1; /* a second hinge of one point, which moves */
+        memcpy(c.joint_body + 2 * (last - 1), c.joint_body + 2 * last, 2 * sizeof(int));
+        memcpy(c.joint_body + 2 * (last - 2), c.joint_body + 2 * last, 2 * sizeof(int));
+        memcpy(c.joint_body + 2 * (last - 3), c.joint_body + 2 * last, 2 * sizeof(int));
+        memcpy(c.je + 6 * (last - 3), c.je + 6 * (last - 1), 12 * sizeof(double));
+        c.ce[last] = 1;
+        assert_int_equal(carom_contact_solve(s, &c.p, CAROM_GUESS_NONE, &c.x, &st),
+                         CAROM_E_INFEASIBLE);
+        carom_contact_destroy(s);
+        contact_case_free(&c);
+    }
+    contact_case_free(&one);
 }
 
 static void move_contact(const contact_case *from, int k, contact_case *to, int at)
@@ -726,6 +776,7 @@ int main(void)
         cmocka_unit_test(settings_are_checked),
         cmocka_unit_test(residual_of_a_wrong_point),
         cmocka_unit_test(repeats_bit_for_bit),
+        cmocka_unit_test(threads_do_not_matter),
         cmocka_unit_test(order_of_contacts_does_not_matter),
         cmocka_unit_test(good_guess_takes_one_factorization),
         cmocka_unit_test(no_allocation_in_steady_state),

@@ -77,6 +77,14 @@ carom_status crm_contact_check(const carom_contact_problem *p)
     return CAROM_OK;
 }
 
+carom_status crm_solution_check(const carom_contact_problem *p, const carom_contact_solution *x)
+{
+    if (!x || (p->n_bodies && !x->v) || (p->n_joint_rows && !x->le) ||
+        (p->n_contacts && (!x->ln || !x->lt || !x->mode)))
+        return CAROM_E_ARGUMENT;
+    return CAROM_OK;
+}
+
 int crm_modes_valid(const carom_contact_problem *p, const unsigned char *mode)
 {
     for (int k = 0; k < p->n_contacts; k++) {

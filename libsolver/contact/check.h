@@ -11,6 +11,9 @@
  * CAROM_E_CAPACITY: a count above CRM_MAX_COUNT. */
 carom_status crm_contact_check(const carom_contact_problem *p);
 
+/* CAROM_E_ARGUMENT: an array of the solution is missing. */
+carom_status crm_solution_check(const carom_contact_problem *p, const carom_contact_solution *x);
+
 /* No mode of a solution is out of range. */
 int crm_modes_valid(const carom_contact_problem *p, const unsigned char *mode);
 

@@ -1,24 +1,20 @@
 #include "libsolver/contact/check.h"
-#include "libsolver/contact/ladder/ladder.h"
+#include "libsolver/contact/islands.h"
 #include "libsolver/contact/residual.h"
-#include "libsolver/contact/solver.h"
 
 #include <math.h>
-
-/* A contact is degenerate when its complementary quantities are both below this, in the island's
- * unit scale [1]. */
-#define DEGENERATE 1e-9
 
 carom_contact_settings carom_contact_defaults(void)
 {
     return (carom_contact_settings){
-        .accept = 1e-10, .inexact = 1e-6, .max_iterations = 60, .max_restarts = 12};
+        .accept = 1e-10, .inexact = 1e-6, .max_iterations = 60, .max_restarts = 12, .threads = 1};
 }
 
 static int settings_valid(const carom_contact_settings *s)
 {
     return s->accept > 0 && s->accept < HUGE_VAL && s->inexact >= s->accept &&
-           s->inexact < HUGE_VAL && s->max_iterations > 0 && s->max_restarts >= 0;
+           s->inexact < HUGE_VAL && s->max_iterations > 0 && s->max_restarts >= 0 &&
+           s->threads >= 1 && s->threads <= CRM_MAX_THREADS;
 }
 
 carom_status carom_contact_create(const carom_contact_settings *settings,
@@ -70,20 +66,6 @@ carom_status crm_solver_prepare(carom_contact_solver *c, const carom_contact_pro
     return crm_system_reserve(m, &c->system, &c->graph, &c->pattern);
 }
 
-/* Certificate of one violated prescribed row, in the direction of its violation. */
-static carom_status give_row(carom_contact_solver *c, const carom_contact_problem *p, int row,
-                             double y)
-{
-    const int n = p->n_contacts + p->n_joint_rows;
-    const carom_status s =
-        crm_reserve(&c->memory, (void **)&c->certificate, &c->certificate_max, n, sizeof(double));
-    if (s < 0) return s;
-    memset(c->certificate, 0, (size_t)n * sizeof(double));
-    c->certificate[row] = y;
-    c->certificate_valid = 1;
-    return CAROM_E_INFEASIBLE;
-}
-
 /* Rows that no impulse can change must hold as they are. */
 static carom_status check_prescribed(carom_contact_solver *c, const carom_contact_problem *p,
                                      double speed)
@@ -93,76 +75,14 @@ static carom_status check_prescribed(carom_contact_solver *c, const carom_contac
         const int *body = p->contact_body + 2 * k;
         const double a = crm_row_times(p->jn + 6 * k, body, p->u) + p->cn[k];
         if (a >= 0 || crm_row_weight(p->jn + 6 * k, body, p->inv_mass) > 0) continue;
-        if (a < -limit) return give_row(c, p, k, 1);
+        if (a < -limit) return crm_give_row(c, p, k, 1);
     }
     for (int r = 0; r < p->n_joint_rows; r++) {
         const int *body = p->joint_body + 2 * r;
         if (crm_row_weight(p->je + 6 * r, body, p->inv_mass) > 0) continue;
         const double e = crm_row_times(p->je + 6 * r, body, p->u) + (p->ce ? p->ce[r] : 0);
-        if (fabs(e) > limit) return give_row(c, p, p->n_contacts + r, e > 0 ? -1 : 1);
+        if (fabs(e) > limit) return crm_give_row(c, p, p->n_contacts + r, e > 0 ? -1 : 1);
     }
-    return CAROM_OK;
-}
-
-/* The island's certificate, in the problem's rows and units. */
-static carom_status give_certificate(carom_contact_solver *c, const carom_contact_problem *p,
-                                     const crm_island *s, int island)
-{
-    const crm_graph *g = &c->graph;
-    const crm_system *y = &c->system;
-    if (give_row(c, p, 0, 0) == CAROM_E_MEMORY) return CAROM_E_MEMORY;
-    for (int k = 0; k < s->nc; k++) {
-        const int slot = g->contact_ptr[island] + k;
-        c->certificate[g->contact_of[slot]] = y->scale_n[slot] * s->x.n[k];
-    }
-    for (int q = 0; q < s->ng; q++) {
-        const int slot = g->group_ptr[island] + q;
-        for (int i = 0; i < g->group_size[slot]; i++)
-            c->certificate[p->n_contacts + g->group_row[slot] + i] =
-                y->scale_e[3 * slot + i] * s->x.z[3 * (s->nb + q) + i];
-    }
-    return CAROM_E_INFEASIBLE;
-}
-
-/* Weakly active, or on the border of slipping. */
-static int count_degenerate(crm_island *s)
-{
-    int n = 0;
-    if (!s->fresh) crm_island_residual(s, s->best); /* leaves a and u */
-    for (int k = 0; k < s->nc; k++) {
-        const double ln = s->best.n[k];
-        const double bound = s->contact[k].mu * ln;
-        const double u = fabs(s->ut[k]);
-        const int weak = fmax(fabs(s->an[k]), fabs(ln)) < DEGENERATE;
-        const int border = s->contact[k].mu > 0 && ln >= DEGENERATE && u < DEGENERATE &&
-                           fabs(fabs(s->best.t[k]) - bound) < DEGENERATE;
-        n += weak || border;
-    }
-    return n;
-}
-
-static carom_status solve_island(carom_contact_solver *c, const carom_contact_problem *p,
-                                 int island, int use_guess, const carom_contact_solution *x,
-                                 carom_contact_stats *stats)
-{
-    const crm_graph *g = &c->graph;
-    crm_system_gather(&c->system, g, p, island);
-    crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
-    s.accept = c->settings.accept;
-    s.inexact = c->settings.inexact;
-    s.max_iterations = c->settings.max_iterations;
-    s.max_restarts = c->settings.max_restarts;
-    if (use_guess) crm_system_read(&c->system, g, &s, island, x, use_guess);
-    carom_contact_stage stage;
-    double unpolished;
-    const carom_status status = crm_ladder_climb(&s, use_guess, &stage, &unpolished);
-    stats->factorizations += s.factorizations;
-    stats->iterations += s.iterations;
-    if (s.factorizations) stats->blocks += 2 * (s.lu.lp[s.lu.n] - s.lu.lp[0]) + s.lu.n;
-    if (stage > stats->stage) stats->stage = stage;
-    if (status == CAROM_E_INFEASIBLE) return give_certificate(c, p, &s, island);
-    stats->residual_unpolished = fmax(stats->residual_unpolished, unpolished);
-    stats->degenerate += count_degenerate(&s);
     return CAROM_OK;
 }
 
@@ -211,6 +131,7 @@ static carom_status solve(carom_contact_solver *c, const carom_contact_problem *
                           carom_contact_solution *x, carom_contact_stats *stats)
 {
     carom_status s = crm_contact_check(p);
+    if (s >= 0) s = crm_solution_check(p, x);
     if (s < 0) return s;
     s = crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, 6 * p->n_bodies + 1,
                     sizeof(double));
@@ -219,8 +140,7 @@ static carom_status solve(carom_contact_solver *c, const carom_contact_problem *
     const double speed = crm_contact_speed(p);
     s = check_prescribed(c, p, speed);
     if (s >= 0) count(c, stats);
-    for (int i = 0; i < c->graph.n_islands && s >= 0; i++)
-        s = solve_island(c, p, i, use_guess, x, stats);
+    if (s >= 0) s = crm_islands_solve(c, p, use_guess, x, stats);
     if (s < 0) return s;
     write_solution(c, p, x);
     stats->residual = crm_contact_residual(p, x, speed, c->scratch);
@@ -232,6 +152,7 @@ carom_status carom_contact_solve(carom_contact_solver *solver, const carom_conta
                                  carom_contact_stats *stats)
 {
     carom_contact_stats own = {.stage = CAROM_STAGE_NONE, .residual = HUGE_VAL};
+    if (!solver) return CAROM_E_ARGUMENT;
     solver->certificate_valid = 0;
     own.status = solve(solver, problem, use_guess, x, &own);
     if (stats) *stats = own;
@@ -240,7 +161,7 @@ carom_status carom_contact_solve(carom_contact_solver *solver, const carom_conta
 
 carom_status carom_contact_certificate(const carom_contact_solver *solver, double *yn, double *ye)
 {
-    if (!solver->certificate_valid) return CAROM_E_STATE;
+    if (!solver || !solver->certificate_valid) return CAROM_E_STATE;
     const crm_graph *g = &solver->graph;
     for (int k = 0; k < g->n_contacts; k++) yn[k] = solver->certificate[k];
     for (int r = 0; r < g->n_rows; r++) ye[r] = solver->certificate[g->n_contacts + r];

@@ -20,6 +20,7 @@ static void layout(crm_arena *a, crm_system *y, const crm_graph *g, const crm_bl
     y->root = crm_arena_doubles(a, 3 * nn);
     y->free = crm_arena_doubles(a, 3 * nn);
     y->speed = crm_arena_doubles(a, g->n_islands);
+    y->outcome = crm_arena_take(a, (size_t)g->n_islands, sizeof(crm_outcome));
     y->response = crm_arena_take(a, (size_t)nc, sizeof(crm_response));
     for (int i = 0; i < CRM_N_VECTORS; i++) {
         y->vec[i].z = crm_arena_doubles(a, 3 * (nn + ng));

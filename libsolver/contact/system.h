@@ -4,6 +4,17 @@
 
 #include "libsolver/contact/island.h"
 
+/* How an island ended. */
+typedef struct crm_outcome {
+    carom_status status;
+    carom_contact_stage stage;
+    double unpolished;
+    int factorizations;
+    int iterations;
+    int blocks;
+    int degenerate;
+} crm_outcome;
+
 typedef struct crm_system {
     crm_arena arena;
     crm_contact *contact; /* per slot, like all below */
@@ -13,7 +24,8 @@ typedef struct crm_system {
     double *scale_e; /* 3 per group */
     double *root;    /* 3 per node: sqrt(W) */
     double *free;
-    double *speed; /* per island: velocity unit V of its variables */
+    double *speed;        /* per island: velocity unit V of its variables */
+    crm_outcome *outcome; /* per island */
     /* Work of the islands, sliced. */
     crm_response *response;
     crm_vec vec[CRM_N_VECTORS];

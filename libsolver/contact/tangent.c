@@ -156,7 +156,9 @@ carom_status carom_contact_tangent(carom_contact_solver *solver,
                                    const carom_contact_direction *direction, double *dv)
 {
     const carom_contact_problem *p = problem;
+    if (!solver || !direction || !dv) return CAROM_E_ARGUMENT;
     carom_status s = crm_contact_check(p);
+    if (s >= 0) s = crm_solution_check(p, x);
     if (s >= 0 && !crm_modes_valid(p, x->mode)) s = CAROM_E_ARGUMENT;
     if (s >= 0) s = reserve_scratch(solver, p);
     if (s >= 0) s = crm_solver_prepare(solver, p);
