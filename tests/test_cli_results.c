@@ -43,13 +43,15 @@ static void gradient_has_its_arrays(void **state)
     program_free(&c);
 }
 
-/* Loss and gradient of a free body in closed form: x_n = x0 + n h v0 + (F/m) h^2 n (n + 1)/2. */
+/* Loss and gradient of a free body in closed form, Euler: x_n = x0 + n h v0 + (F/m) h^2 n (n +
+ * 1)/2. */
 static void gradient_of_a_free_body(void **state)
 {
     (void)state;
     program_write("free.json",
                   "{\"format\":\"carom-scene/1\",\"gravity\":[0,0],\"dt\":0.25,\"duration\":"
-                  "1,\"bodies\":[{\"name\":\"b\",\"mass\":2,\"inertia\":1,\"velocity\":[3,0],"
+                  "1,\"settings\":{\"integrator\":\"euler\"},\"bodies\":[{\"name\":\"b\",\"mass\":"
+                  "2,\"inertia\":1,\"velocity\":[3,0],"
                   "\"forces\":[0,5,0]}]}");
     program_write("free_loss.json", "{\"terms\":[{\"step\":4,\"body\":\"b\",\"component\":\"x\","
                                     "\"weight\":0.5,\"target\":1},{\"step\":0,\"body\":0,"

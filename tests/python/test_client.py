@@ -28,7 +28,7 @@ from support import CAROMD, SCENES, carom, needs_carom, needs_caromd
 
 def free_body():
     """No gravity, no contact: closed forms."""
-    scene = Scene("free", gravity=(0, 0), dt=0.25)
+    scene = Scene("free", gravity=(0, 0), dt=0.25, settings={"integrator": "euler"})
     scene.dynamic(circle(1), mass=2, inertia=1, velocity=(3, 0), forces=[0, 5, 0])
     return scene
 
