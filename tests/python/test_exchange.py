@@ -216,7 +216,25 @@ class Timing(unittest.TestCase):
         self.assertIsInstance(bus.wait(bus.steps(1)).error, ServerTimeout)
 
 
+    def test_an_answer_that_never_comes_is_a_timeout(self):
+        bus = Bus()
+        bus.wait(bus.open())
+        message = step_request_t()
+        exchange = bus.protocol.start(Exchange("CAROM_STEP", message, needs="CAROM_PARAMETER_GRADIENT"))
+        self.assertIsInstance(bus.wait(exchange).error, ServerTimeout)
+        self.assertAlmostEqual(bus.now, 10, delta=0.1)
+        self.assertLess(exchange.sent, 40)  # repetitions grow to two a second
+
+
 class Refusals(unittest.TestCase):
+    def test_messages_of_another_version(self):
+        bus = Bus()
+        bus.silent = True
+        exchange = bus.open()
+        reply = bus.reply(exchange.message, reply_t.OK).encode()
+        bus.protocol.receive("CAROM_REPLY", b"12345678" + reply[8:])
+        self.assertRegex(str(exchange.error), "make the types again with: python -m carom.build_messages")
+
     def test_failed_computation_keeps_its_states(self):
         bus = Bus()
         bus.wait(bus.open())

@@ -2,7 +2,7 @@
 
 An effect happens once however often its request arrives: requests carry (client_id, session, seq)
 and are repeated after 20 ms, then 1.5 times as long each time, at most 500 ms, until they are
-answered; 10 s without a sign of life are a timeout.  States that did not arrive are asked for again
+answered; 10 s without anything new are a timeout.  States that did not arrive are asked for again
 by step.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import secrets
+import struct
 import time
 
 from .errors import CaromError, ComputationFailed, NoServer, Refused, ServerTimeout, SessionLost
@@ -33,6 +34,9 @@ LARGEST_SCENE = 4 << 20  # [bytes]
 
 ANSWERS = {"CAROM_STATE": state_t, "CAROM_PARAMETER_GRADIENT": parameter_gradient_t,
            "CAROM_SCENE_UPDATED": scene_t, "CAROM_REPLY": reply_t}
+
+# Fingerprint, utime, client_id, session and seq: how every message starts.
+HEAD = struct.Struct(">8sqqiq")
 
 START = "start it with: caromd"
 
@@ -222,28 +226,43 @@ class Protocol:
         kind = channel[:len(channel) - len(self.suffix)] if self.suffix else channel
         try:
             message = ANSWERS[kind].decode(data)
-        except (KeyError, ValueError):
+        except KeyError:
+            return
+        except (ValueError, struct.error):
+            self._take_foreign(kind, data)
             return
         if message.client_id != self.client_id or message.session != self.session:
             return
-        if kind == "CAROM_REPLY" and self._is_stale(message):
-            return
         self._heard = True
         exchange = self.pending.get(message.seq)
-        now = self._clock()
-        for other in self.pending.values():
-            other.deadline = now + self.timeout
         if kind == "CAROM_REPLY":
             self._take_reply(message, exchange)
         elif exchange is not None:
             self._take_answer(kind, message, exchange)
 
+    def _take_foreign(self, kind, data):
+        """Noise is passed over.  A message to us of another fingerprint is no noise."""
+        if len(data) < HEAD.size or data[:8] == ANSWERS[kind]._get_packed_fingerprint():
+            return
+        if HEAD.unpack_from(data)[2:4] == (self.client_id, self.session):
+            self._fail_all(list(self.pending.values()), CaromError(
+                f"the server's messages on {kind} are not those of this package; make the types "
+                "again with: python -m carom.build_messages"))
+
+    def _renew(self):
+        """A sign of life that brought something: all requests may wait on."""
+        for exchange in self.pending.values():
+            exchange.deadline = self._clock() + self.timeout
+
     def _take_answer(self, kind, message, exchange):
         if kind == "CAROM_STATE":
-            exchange.states.setdefault(message.step, message)
+            if message.step in exchange.states:
+                return
+            exchange.states[message.step] = message
             exchange.take_states()
         elif kind == exchange.needs:
             exchange.answer = message
+        self._renew()
         self._complete(exchange)
 
     def _take_reply(self, reply, exchange):
@@ -261,24 +280,33 @@ class Protocol:
 
     def _settle(self, reply, exchange):
         code = reply.reply_code
-        if code == reply_t.CHUNK:
+        if code in (reply_t.OK, reply_t.FAILED):
+            self._take_end(reply, exchange)
+        elif code == reply_t.CHUNK:
+            self._renew()
             exchange.acknowledge(reply)
         elif code == reply_t.PENDING:
+            self._renew()
             exchange.wait = LONGEST_WAIT
         elif code == reply_t.BUSY:
-            return  # not taken: it is sent again in its time
-        elif code in (reply_t.OK, reply_t.FAILED):
-            exchange.reply = reply
-            self._complete(exchange)
-            if not exchange.done:  # something that came before the reply was lost
-                exchange.wait = FIRST_WAIT
-                exchange.next_send = min(exchange.next_send, self._clock() + FIRST_WAIT)
+            self._renew()  # not taken: it is sent again in its time
         elif code in (reply_t.MALFORMED, reply_t.LIMIT):
             self._withdraw(exchange, Refused(reply.reply_text or f"reply code {code}"))
         elif code == reply_t.FORGOTTEN:
             self._fail(exchange, SessionLost("the answer is no longer kept by the server"))
         else:
             self._fail(exchange, Refused(reply.reply_text or f"reply code {code}"))
+
+    def _take_end(self, reply, exchange):
+        """The request is executed; what came before the reply may have been lost."""
+        is_first = exchange.reply is None
+        if is_first:
+            self._renew()
+        exchange.reply = reply
+        self._complete(exchange)
+        if is_first and not exchange.done:
+            exchange.wait = FIRST_WAIT
+            exchange.next_send = min(exchange.next_send, self._clock() + FIRST_WAIT)
 
     def _complete(self, exchange):
         """Done when reply, states and answer are all there."""
@@ -305,12 +333,11 @@ class Protocol:
         self._seq = seq - 1
 
     def _fill_gap(self, reply):
-        """An earlier request did not arrive: it is sent again at once."""
-        self.pending[reply.next_seq].next_send = 0.0
-
-    def _is_stale(self, reply):
-        """A gap that was filled meanwhile."""
-        return reply.reply_code == reply_t.GAP and reply.next_seq not in self.pending
+        """An earlier request did not arrive: it is sent again at once, unless it was answered since."""
+        first = self.pending.get(reply.next_seq)
+        if first is not None:
+            self._renew()
+            first.next_send = 0.0
 
     def _lose(self, text):
         self._fail_all(list(self.pending.values()), SessionLost(text))
