@@ -100,7 +100,7 @@ static int guess_is_exact(crm_island *s)
 static int try_active_sets(climb *c, int use_guess)
 {
     crm_island *s = c->s;
-    if (use_guess && s->nc) {
+    if (use_guess && (s->nc || use_guess == CAROM_GUESS_IMPULSES)) {
         fit_guess(s);
         *c->stage = CAROM_STAGE_GUESS;
         if (use_guess == CAROM_GUESS_IMPULSES && guess_is_exact(s)) return 1;
