@@ -201,11 +201,13 @@ static void run_case(const char *name, contact_case c, int csv)
         carom_contact_solve(b.solver, &b.c.p, CAROM_GUESS_NONE, &b.c.x, &cold);
     double *bars = calloc(3 * (size_t)c.p.n_bodies, sizeof(double));
     b.bars.u = bars;
-    for (int i = 0; i < 3; i++) run_warm(&b); /* modes settle */
-    carom_contact_solve(b.solver, &b.c.p, CAROM_GUESS_IMPULSES, &b.c.x, &warm);
-    const double t_warm = least_time(run_warm, &b);
+    for (int i = 0; status == CAROM_OK && i < 3; i++) run_warm(&b); /* modes settle */
+    warm = cold;
+    if (status == CAROM_OK)
+        carom_contact_solve(b.solver, &b.c.p, CAROM_GUESS_IMPULSES, &b.c.x, &warm);
+    const double t_warm = status == CAROM_OK ? least_time(run_warm, &b) : NAN;
     const double t_adjoint = least_time(run_adjoint, &b);
-    const double t_cold = least_time(run_cold, &b);
+    const double t_cold = status == CAROM_OK ? least_time(run_cold, &b) : NAN;
     const double rows = c.p.n_contacts + 0.5 * c.p.n_joint_rows;
     const char *format =
         csv ? "%s,%d,%d,%s,%.1e,%.4g,%.4g,%.4g,%.3g,%.3g,%d,%.4g,%d,%.4g,%.4g,%.1f\n"
