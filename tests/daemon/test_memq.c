@@ -93,6 +93,7 @@ typedef struct lossy {
     crm_service *service;
     uint64_t rng;
     int percent;
+    int swallow; /* a type of message that never arrives, -1: none */
     long sent, lost;
 } lossy;
 
@@ -112,7 +113,7 @@ static void lossy_emit(void *user, crm_wire_type type, const void *bytes, int si
     lossy *l = user;
     char name[64];
     crm_wire_channel_name(type, "", name);
-    if (!loses(l)) lcm_publish(l->lcm, name, bytes, (unsigned)size);
+    if ((int)type != l->swallow && !loses(l)) lcm_publish(l->lcm, name, bytes, (unsigned)size);
 }
 
 static void lossy_request(const lcm_recv_buf_t *buf, const char *channel, void *user)
@@ -134,6 +135,7 @@ static lossy *start_lossy(int percent, carom_client **client)
     set.user = l;
     set.emit = lossy_emit;
     l->percent = percent;
+    l->swallow = -1;
     l->lcm = lcm_create("memq://");
     l->service = crm_service_create(&set);
     for (int t = 0; t < CRM_WIRE_N_REQUESTS; t++) {
@@ -187,6 +189,29 @@ static void lost_messages_and_gradients(void **state)
     stop_lossy(l, client);
 }
 
+/* The reply arrives, again with every repetition, but never the gradient it speaks of: that is no
+ * progress, and the call must end. */
+static void a_gradient_that_never_comes(void **state)
+{
+    double q_bar[3 * CASE_BODIES] = {0};
+    const carom_state_bar bar = {1, q_bar, NULL};
+    const carom_client_scene s = case_scene();
+    carom_client *client = NULL;
+    carom_client_run run;
+    carom_client_gradient g;
+    (void)state;
+    memset(&run, 0, sizeof run);
+    run.n_steps = 1;
+    run.record = CAROM_RECORD_ON;
+    lossy *l = start_lossy(0, &client);
+    l->swallow = CRM_WIRE_PARAMETER_GRADIENT;
+    assert_int_equal(carom_client_open(client, &s), CAROM_CLIENT_OK);
+    assert_int_equal(carom_client_step(client, &run), CAROM_CLIENT_OK);
+    assert_int_equal(carom_client_gradient_of(client, 0, 1, &bar, CAROM_WRT_MASS, &g),
+                     CAROM_CLIENT_E_TIMEOUT);
+    stop_lossy(l, client);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -196,6 +221,7 @@ int main(void)
         cmocka_unit_test(large_scene),
         cmocka_unit_test(lost_messages_change_nothing),
         cmocka_unit_test(lost_messages_and_gradients),
+        cmocka_unit_test(a_gradient_that_never_comes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

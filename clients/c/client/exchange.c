@@ -15,7 +15,7 @@
 static const double FIRST_WAIT = 0.02; /* [s] until a request is repeated */
 static const double WAIT_GROWTH = 1.5;
 static const double LONGEST_WAIT = 0.5; /* [s] */
-static const double PATIENCE = 10.0;    /* [s] without a sign of life */
+static const double PATIENCE = 10.0;    /* [s] without anything new */
 
 static double now(void)
 {
@@ -179,7 +179,7 @@ static carom_client_code no_answer(carom_client *c, const crm_exchange *x)
                            PATIENCE);
 }
 
-/* Every message from the server extends the patience, and puts off the next repetition. */
+/* A message that brings something extends the patience, and puts off the next repetition. */
 static carom_client_code run(carom_client *c, crm_exchange *x)
 {
     double wait = FIRST_WAIT, seen = now(), next = seen + wait;

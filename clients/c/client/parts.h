@@ -35,7 +35,7 @@ typedef struct crm_exchange {
     carom_reply_t reply; /* its text is in reply_text */
     char reply_text[256];
     char busy_text[256]; /* why the server does not take the request, "": it did */
-    long signs_of_life;  /* messages that arrived */
+    long signs_of_life;  /* messages that brought something new, or that the server is at work */
     int needs_payload;   /* a gradient or a scene belongs to the answer */
     int has_payload;     /* that, or the last state, is there */
     /* Scene in pieces. */

@@ -236,6 +236,23 @@ static crm_wire_type type_of(const carom_client *c, const char *channel)
     return (crm_wire_type)type;
 }
 
+/* Counts all that an answer consists of: grows with news, not with repetitions. */
+static int64_t progress(const crm_exchange *x)
+{
+    return x->n_delivered + x->n_held + x->n_acknowledged + x->has_reply + x->has_payload;
+}
+
+static void take(carom_client *c, crm_wire_type type, const void *bytes, int size)
+{
+    switch (type) {
+    case CRM_WIRE_STATE: on_state(c, bytes, size); break;
+    case CRM_WIRE_REPLY: on_reply(c, bytes, size); break;
+    case CRM_WIRE_PARAMETER_GRADIENT: on_gradient(c, bytes, size); break;
+    case CRM_WIRE_SCENE_UPDATED: on_scene(c, bytes, size); break;
+    default: break;
+    }
+}
+
 void crm_client_on_message(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     carom_client *c = user;
@@ -250,13 +267,9 @@ void crm_client_on_message(const lcm_recv_buf_t *buf, const char *channel, void 
     }
     if (h.client_id != c->client_id || h.session != c->session || h.seq != x->seq) return;
     if (!crm_wire_check(type, &limits, buf->data, buf->data_size, text, sizeof text)) return;
-    x->signs_of_life++;
-    const int size = (int)buf->data_size;
-    switch (type) {
-    case CRM_WIRE_STATE: on_state(c, buf->data, size); break;
-    case CRM_WIRE_REPLY: on_reply(c, buf->data, size); break;
-    case CRM_WIRE_PARAMETER_GRADIENT: on_gradient(c, buf->data, size); break;
-    case CRM_WIRE_SCENE_UPDATED: on_scene(c, buf->data, size); break;
-    default: break;
-    }
+    /* Until the reply is there the server may be at work; after it only news count. */
+    const int works = !x->has_reply && type == CRM_WIRE_REPLY;
+    const int64_t before = progress(x);
+    take(c, type, buf->data, (int)buf->data_size);
+    if (works || progress(x) != before) x->signs_of_life++;
 }

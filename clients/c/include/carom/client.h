@@ -1,7 +1,7 @@
 /* client.h: step and differentiate a scene in a step server (caromd) over LCM.
  *
  * Every call blocks until the server has answered.  Requests are repeated until they are answered
- * (20 ms, then 1.5 times as long each time, at most 500 ms; 10 s without a sign of life end in
+ * (20 ms, then 1.5 times as long each time, at most 500 ms; 10 s without anything new end in
  * CAROM_CLIENT_E_TIMEOUT), and are executed once however often they arrive.  States that did not
  * arrive are asked for again, by step.  After CAROM_CLIENT_E_TIMEOUT or CAROM_CLIENT_E_NETWORK
  * nobody knows what was executed: the session is over, open a scene again.  One client is one
