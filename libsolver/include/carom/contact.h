@@ -57,10 +57,10 @@ typedef struct carom_contact_settings {
     double accept;      /* scaled natural residual of "solved" [1], 1e-10 */
     double inexact;     /* ... of "inexact" [1], 1e-6 */
     int max_iterations; /* interior point iterations per start, 60 */
-    int max_restarts;   /* seeded restarts at the end of the ladder, 12; 0: nor the longer sweeps before
-                         * them, for callers that rather change the problem than wait */
-    int threads;        /* islands are shared among so many when there is enough of them, 1 .. 64; the
-                         * result has the same bits; 1 */
+    int max_restarts;   /* seeded restarts at the end of the ladder, 12; 0: nor the longer sweeps
+                         * before   them, for callers that rather change the problem than wait */
+    int threads; /* islands are shared among so many when there is enough of them, 1 .. 64; the
+                  * result has the same bits; 1 */
 } carom_contact_settings;
 
 CAROM_API carom_contact_settings carom_contact_defaults(void);
