@@ -7,6 +7,10 @@
 /* An event whose gap closes slower than this [1/s of L] has no usable derivative of its time. */
 static const double GRAZING = 1e-9;
 
+/* A cotangent below this is dropped [largest seed]: at rest it shrinks by 1e-9 a sub-step, and
+ * numbers that have lost their normal form make every product slow. */
+static const double NEGLIGIBLE = 1e-200;
+
 static int most_contacts(const carom_tape *t)
 {
     int n = 0;
@@ -77,6 +81,13 @@ static void clear_sink(const crm_reverse *r)
     clear((double *)g->anchors, 4 * (size_t)w->n_joints);
 }
 
+static void drop_negligible(double *x, size_t n, double scale)
+{
+    for (size_t k = 0; k < n; k++) {
+        if (fabs(x[k]) < NEGLIGIBLE * scale) x[k] = 0;
+    }
+}
+
 /* q1 and v1 of a sub-step are the start of the next one. */
 static void end_state(const carom_tape *t, int record, crm_substep *s)
 {
@@ -139,6 +150,9 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
     }
     const carom_status e = crm_substep_vjp(r, &s, r->q_bar, r->v_bar, 1, &h_bar);
     if (e < 0) return e;
+    const size_t n3 = 3 * (size_t)r->world->n_bodies;
+    drop_negligible(r->q_bar, n3, r->scale);
+    drop_negligible(r->v_bar, n3, r->scale);
     r->stats.degenerate += s.degenerate;
     switch (s.end) {
     case CRM_END_FRAME: *left_bar = h_bar; break;
@@ -167,6 +181,7 @@ static void add_bars(crm_reverse *r, int step, int n_bars, const carom_state_bar
             const double g = falls && k % 3 ? w->settings.gravity[k % 3 - 1] : 0;
             const double q_bar = bars[i].q ? bars[i].q[k] : 0;
             const double v_bar = bars[i].v ? bars[i].v[k] : 0;
+            r->scale = fmax(r->scale, fmax(fabs(q_bar), fabs(v_bar)));
             r->q_bar[k] += q_bar;
             r->v_bar[k] += v_bar;
             *carry_bar += q_bar * v[k] + v_bar * (f ? W * f[k] + g : 0);

@@ -41,6 +41,7 @@ typedef struct crm_reverse {
     carom_tape *tape;
     carom_world *world;
     crm_sink sink;
+    double scale;          /* largest seed so far */
     double *q_bar, *v_bar; /* 3 n_bodies: state under way */
     double *q_seed, *v_seed;
     double *q_event;      /* 3 n_bodies: d gap / d q1 */
