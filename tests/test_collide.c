@@ -25,6 +25,8 @@ static const carom_vec2 ORIGIN[1] = {{0, 0}};
 static const carom_vec2 BOX[4] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
 static const carom_vec2 SMALL[4] = {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}};
 static const carom_vec2 GROUND[4] = {{-50, -1}, {50, -1}, {50, 0}, {-50, 0}};
+static const carom_vec2 WIDE[4] = {{-20, -1}, {20, -1}, {20, 1}, {-20, 1}};
+static const carom_vec2 PLATE[4] = {{-0.5, -0.25}, {0.5, -0.25}, {0.5, 0.25}, {-0.5, 0.25}};
 static const carom_vec2 LEVEL[2] = {{-1, 0}, {1, 0}};
 static const carom_vec2 FROM_ORIGIN[2] = {{0, 0}, {4, 0}};
 static const carom_vec2 UPRIGHT[2] = {{0, -1}, {0, 1}};
@@ -121,6 +123,10 @@ static const named CASES[] = {
      {{-1, -1, -1, 1}, {1, -1, 1, 1}}},
     {"small in large, same center", HULL(BOX), {0, 0, 0}, HULL(SMALL), {0, 0, 0}, -1.5, {0, -1},
      1, 2, {{-0.5, -1, -0.5, 0.5}, {0.5, -1, 0.5, 0.5}}},
+    /* an axis that separates by rounding alone is no start for a walk: this was 20.5 m apart */
+    {"flush, turned by a rounding", HULL(WIDE), {0, 0, -1.0000000499999999}, HULL(PLATE),
+     {-1.4306165677880186e-17, -2.6858445809288368e-19, 0.24999995}, 0, {0, 1}, 1, 2,
+     {{-0.5, -0.00000005, -0.5, -0.00000005}, {0.5, -0.00000005, 0.5, -0.00000005}}},
     {"rounded boxes apart", ROUNDED(0.5, BOX), {0, 0, 0}, ROUNDED(0.25, BOX), {0, 5, 6}, 4.25,
      {0.6, 0.8}, 0, 1, {{1.3, 1.4, 3.85, 4.8}}},
     {"rounded boxes, roundings overlap", ROUNDED(0.5, BOX), {0, 0, 0}, ROUNDED(0.25, BOX), {0, 0,

@@ -83,7 +83,7 @@ static carom_status check_shapes(carom_world *w, const carom_body_def *d)
     return CAROM_OK;
 }
 
-/* The eight arrays with one row per body, in one block. */
+/* The seven arrays with one row per body, in one block. */
 static void lay_bodies(carom_world *w, crm_block *b, size_t n, double **arrays[7])
 {
     static const size_t width[7] = {3, 3, 3, 1, 1, 1, 1};

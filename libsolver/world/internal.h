@@ -7,6 +7,8 @@
 #include "carom/collide.h"
 #include "carom/world.h"
 
+#include <math.h>
+
 /* Corrections after an Euler step: four reach rounding level from 1e-2. */
 #define CRM_MAX_CORRECTIONS 4
 #define CRM_MAX_SOLVES      (1 + CRM_MAX_CORRECTIONS)
@@ -140,7 +142,7 @@ typedef struct crm_guess {
     unsigned char mode;
 } crm_guess;
 
-/* Told of every accepted sub-step and of the end of every step. */
+/* Told of every accepted sub-step. */
 typedef struct crm_recorder {
     carom_status (*substep)(void *user, const crm_substep *s);
     void *user;
@@ -156,7 +158,7 @@ struct carom_world {
     double *q, *v;                                   /* 3 n_bodies */
     double *force;                                   /* 3 n_bodies: constant */
     double *mass, *inertia, *friction, *restitution; /* n_bodies */
-    void *body_block;                                /* holds the eight arrays above */
+    void *body_block;                                /* holds the seven arrays above */
     size_t body_bytes;
     int n_shapes, max_shapes;
     crm_shape *shapes;
@@ -187,12 +189,11 @@ struct carom_world {
     long revision; /* counts changes of parameters */
     double carry;  /* time owed to the next step: always 0, but with a derivative */
     long n_steps;
-    double time;
     carom_step_stats *stats; /* of the step under way */
     crm_recorder recorder;
 };
 
-/* error.c: sets world->error and returns status. */
+/* world.c: sets world->error and returns status. */
 #ifdef __GNUC__
 __attribute__((format(printf, 3, 4)))
 #endif
@@ -203,6 +204,14 @@ static inline carom_pose crm_pose(const double *q, int body)
 {
     const carom_pose p = {q[3 * body], q[3 * body + 1], q[3 * body + 2]};
     return p;
+}
+
+static inline carom_vec2 crm_rotate(double angle, carom_vec2 v)
+{
+    const double c = cos(angle);
+    const double s = sin(angle);
+    const carom_vec2 r = {c * v.x - s * v.y, s * v.x + c * v.y};
+    return r;
 }
 
 /* Requests so far of the world and of all that it owns. */

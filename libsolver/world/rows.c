@@ -49,20 +49,12 @@ void crm_contact_rows(const crm_contact *c, double jn[6], double jt[6])
     direction_row(c->arm_a, c->arm_b, t, jt);
 }
 
-static carom_vec2 rotate(double angle, carom_vec2 v)
-{
-    const double c = cos(angle);
-    const double s = sin(angle);
-    const carom_vec2 r = {c * v.x - s * v.y, s * v.x + c * v.y};
-    return r;
-}
-
 void crm_joint_rows(const crm_joint *j, const double *q, double je[12], double error[2])
 {
     const carom_pose a = crm_pose(q, j->body_a);
     const carom_pose b = crm_pose(q, j->body_b);
-    const carom_vec2 ra = rotate(a.angle, j->local_a);
-    const carom_vec2 rb = rotate(b.angle, j->local_b);
+    const carom_vec2 ra = crm_rotate(a.angle, j->local_a);
+    const carom_vec2 rb = crm_rotate(b.angle, j->local_b);
     const double rows[12] = {-ra.y, 1, 0, rb.y, -1, 0, ra.x, 0, 1, -rb.x, 0, -1};
     memcpy(je, rows, sizeof rows);
     error[0] = (a.x - b.x) + (ra.x - rb.x);

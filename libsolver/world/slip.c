@@ -4,14 +4,6 @@
 
 #include <math.h>
 
-static carom_vec2 rotate(double angle, carom_vec2 v)
-{
-    const double c = cos(angle);
-    const double s = sin(angle);
-    const carom_vec2 r = {c * v.x - s * v.y, s * v.x + c * v.y};
-    return r;
-}
-
 static double dot(carom_vec2 a, carom_vec2 b)
 {
     return a.x * b.x + a.y * b.y;
@@ -20,7 +12,7 @@ static double dot(carom_vec2 a, carom_vec2 b)
 /* Center of a round vertex in the world. */
 static carom_vec2 center(carom_pose p, carom_vec2 v)
 {
-    const carom_vec2 r = rotate(p.angle, v);
+    const carom_vec2 r = crm_rotate(p.angle, v);
     const carom_vec2 x = {p.x + r.x, p.y + r.y};
     return x;
 }
@@ -49,7 +41,7 @@ carom_vec2 crm_slide_point(const crm_slide *s, const double *q)
     const carom_pose k = crm_pose(q, s->face_body);
     const carom_vec2 x = center(crm_pose(q, s->point_body), s->v);
     const carom_vec2 d = {x.x - k.x, x.y - k.y};
-    return rotate(-k.angle, d);
+    return crm_rotate(-k.angle, d);
 }
 
 /* A vertex of body i, rounded by r, on a face of body k: y its place in the frame of k,
