@@ -83,6 +83,8 @@ typedef struct carom_body_def {
 
 /* Dynamic, no shape, mass 1, inertia 1, friction 0.5, restitution 0, collides with all. */
 CAROM_API carom_body_def carom_body_defaults(void);
+/* The same of a type and at a place [m]. */
+CAROM_API carom_body_def carom_body_at(carom_body_type type, double x, double y);
 
 typedef struct carom_world carom_world;
 
@@ -99,6 +101,17 @@ CAROM_API const char *carom_world_error(const carom_world *world);
  * CAROM_E_MEMORY; CAROM_E_STATE after the first step. */
 CAROM_API carom_status carom_world_add_body(carom_world *world, const carom_body_def *def,
                                             int *index);
+/* Adds a body whose mass and inertia follow from its shapes and their density [kg/m^2], > 0; mass
+ * and inertia of def are not read.  Overlaps of shapes count twice.  Static and kinematic bodies
+ * have no mass: density is not read.  CAROM_E_ARGUMENT also where the shapes have no area, or their
+ * centroid is not the position (within 1e-6 of the extent). */
+CAROM_API carom_status carom_world_add_solid(carom_world *world, const carom_body_def *def,
+                                             double density, int *index);
+/* The same with one shape around the position, in place of those of def. */
+CAROM_API carom_status carom_world_add_circle(carom_world *world, const carom_body_def *def,
+                                              double radius, double density, int *index);
+CAROM_API carom_status carom_world_add_box(carom_world *world, const carom_body_def *def,
+                                           double width, double height, double density, int *index);
 /* Pins two bodies together at a world point, at their present poses.  At least one is dynamic.
  * Joined bodies do not collide with each other. */
 CAROM_API carom_status carom_world_add_revolute(carom_world *world, int body_a, int body_b,
