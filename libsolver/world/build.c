@@ -168,6 +168,7 @@ static void add_body(carom_world *w, const carom_body_def *d)
     body->first_shape = w->n_shapes;
     body->n_shapes = d->n_shapes;
     body->collide = d->collide;
+    body->sensor = d->sensor;
     body->filter = d->filter;
     w->q[3 * b] = d->pose.angle;
     w->q[3 * b + 1] = d->pose.x;
@@ -253,6 +254,70 @@ carom_status carom_world_add_revolute(carom_world *world, int body_a, int body_b
                          to_local(crm_pose(w->q, body_b), anchor)};
     if (index) *index = w->n_joints;
     w->joints[w->n_joints++] = j;
+    return CAROM_OK;
+}
+
+/* Where the pair is in the sorted list, or belongs. */
+static int excluded_at(const carom_world *w, carom_pair p)
+{
+    int low = 0;
+    int high = w->n_excluded;
+    while (low < high) {
+        const int mid = low + (high - low) / 2;
+        const carom_pair m = w->excluded[mid];
+        if (m.a < p.a || (m.a == p.a && m.b < p.b)) {
+            low = mid + 1;
+        } else {
+            high = mid;
+        }
+    }
+    return low;
+}
+
+static carom_pair ordered(int a, int b)
+{
+    const carom_pair p = {a < b ? a : b, a < b ? b : a};
+    return p;
+}
+
+static int is_excluded(const carom_world *w, int at, carom_pair p)
+{
+    return at < w->n_excluded && w->excluded[at].a == p.a && w->excluded[at].b == p.b;
+}
+
+int crm_excluded(const carom_world *w, int body_a, int body_b)
+{
+    if (!w->n_excluded) return 0;
+    const carom_pair p = ordered(body_a, body_b);
+    return is_excluded(w, excluded_at(w, p), p);
+}
+
+carom_status carom_world_exclude(carom_world *world, int body_a, int body_b)
+{
+    if (!world) return CAROM_E_ARGUMENT;
+    carom_world *w = world;
+    if (w->sealed) {
+        return crm_world_fail(w, CAROM_E_STATE, "pairs are excluded before the world is sealed");
+    }
+    const int missing = body_a < 0 || body_a >= w->n_bodies ? body_a : body_b;
+    if (missing < 0 || missing >= w->n_bodies) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "exclusion: there is no body %d", missing);
+    }
+    if (body_a == body_b) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "exclusion: body %d twice", body_a);
+    }
+    const carom_pair p = ordered(body_a, body_b);
+    const int at = excluded_at(w, p);
+    if (is_excluded(w, at, p)) return CAROM_OK;
+    void *list = w->excluded;
+    const carom_status e =
+        crm_reserve(&w->memory, &list, &w->max_excluded, w->n_excluded + 1, sizeof *w->excluded);
+    w->excluded = list;
+    if (e) return crm_world_fail(w, e, "no memory for an exclusion");
+    memmove(w->excluded + at + 1, w->excluded + at,
+            (size_t)(w->n_excluded - at) * sizeof *w->excluded);
+    w->excluded[at] = p;
+    w->n_excluded++;
     return CAROM_OK;
 }
 

@@ -31,10 +31,13 @@ void crm_sort_joined(carom_world *w)
     qsort(w->joined, (size_t)w->n_joints, sizeof *w->joined, compare_keys);
 }
 
-static int filters_meet(const crm_body *a, const crm_body *b)
+int crm_may_meet(const carom_world *w, int body_a, int body_b)
 {
-    if (a->filter.group && a->filter.group == b->filter.group) return a->filter.group > 0;
-    return (a->filter.category & b->filter.mask) && (b->filter.category & a->filter.mask);
+    const crm_body *a = &w->bodies[body_a];
+    const crm_body *b = &w->bodies[body_b];
+    if (body_a == body_b || !a->collide || !b->collide) return 0;
+    return crm_filters_meet(&a->filter, &b->filter) && !joined(w, body_a, body_b) &&
+           !crm_excluded(w, body_a, body_b);
 }
 
 int crm_may_collide(const carom_world *w, carom_pair pair)
@@ -43,9 +46,9 @@ int crm_may_collide(const carom_world *w, carom_pair pair)
     const int ib = w->shapes[pair.b].body;
     const crm_body *a = &w->bodies[ia];
     const crm_body *b = &w->bodies[ib];
-    if (ia == ib || !a->collide || !b->collide) return 0;
+    if (a->sensor || b->sensor) return 0;
     if (a->type != CAROM_DYNAMIC && b->type != CAROM_DYNAMIC) return 0;
-    return filters_meet(a, b) && !joined(w, ia, ib);
+    return crm_may_meet(w, ia, ib);
 }
 
 static carom_box grown(carom_box x, double margin)
@@ -62,6 +65,13 @@ static carom_box joined_box(carom_box a, carom_box b)
     return c;
 }
 
+/* Overlaps nothing: no step pays for a sensor. */
+static carom_box no_box(void)
+{
+    const carom_box none = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
+    return none;
+}
+
 carom_status crm_candidates(carom_world *w, const double *q0, const double *q1, double margin,
                             int *n_pairs, const carom_pair **pairs)
 {
@@ -69,7 +79,7 @@ carom_status crm_candidates(carom_world *w, const double *q0, const double *q1, 
         const crm_shape *s = &w->shapes[k];
         carom_box box = carom_shape_box(&s->view, crm_pose(q0, s->body));
         if (q1 != q0) box = joined_box(box, carom_shape_box(&s->view, crm_pose(q1, s->body)));
-        w->boxes[k] = grown(box, 0.5 * margin);
+        w->boxes[k] = w->bodies[s->body].sensor ? no_box() : grown(box, 0.5 * margin);
     }
     return carom_broadphase_pairs(w->broadphase, w->n_shapes, w->boxes, n_pairs, pairs);
 }

@@ -22,6 +22,7 @@ typedef struct crm_body {
     int first_shape;
     int n_shapes;
     int collide;
+    int sensor;
     int unknown; /* index among the moving bodies, -1: static */
     carom_filter filter;
 } crm_body;
@@ -166,6 +167,8 @@ struct carom_world {
     carom_vec2 *vertices;
     int n_joints, max_joints;
     crm_joint *joints;
+    int n_excluded, max_excluded;
+    carom_pair *excluded; /* bodies, a < b, sorted */
 
     /* From here on: made by seal. */
     int sealed;
@@ -225,6 +228,14 @@ static inline int crm_unknown(const carom_world *w, int body)
 
 /* build.c: room for one more body; also makes the arrays of an empty world. */
 carom_status crm_reserve_bodies(carom_world *w);
+/* build.c: whether the caller excluded this pair. */
+int crm_excluded(const carom_world *w, int body_a, int body_b);
+
+static inline int crm_filters_meet(const carom_filter *a, const carom_filter *b)
+{
+    if (a->group && a->group == b->group) return a->group > 0;
+    return (a->category & b->mask) && (b->category & a->mask);
+}
 
 /* detect.c */
 /* Contacts at q with gap <= margin, ordered by shape pair, into sub.contacts. */
@@ -235,7 +246,9 @@ carom_status crm_detect_ahead(carom_world *w, const double *q, const double *v, 
 /* Shape pairs whose boxes, grown by margin and swept from q0 to q1, overlap. */
 carom_status crm_candidates(carom_world *w, const double *q0, const double *q1, double margin,
                             int *n_pairs, const carom_pair **pairs);
-/* Filters, joints and types: whether the shapes of a pair collide at all. */
+/* Filters, joints and exclusions: whether two bodies can meet at all; sealed worlds. */
+int crm_may_meet(const carom_world *w, int body_a, int body_b);
+/* ... and types and sensors: whether the shapes of a pair collide. */
 int crm_may_collide(const carom_world *w, carom_pair pair);
 carom_manifold crm_collide(const carom_world *w, carom_pair pair, const double *q, double margin);
 /* Signed distance of the pair at q0 + at (q1 - q0). */

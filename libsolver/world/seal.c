@@ -58,7 +58,8 @@ static void set_scales(carom_world *w)
         crm_shape *s = &w->shapes[k];
         s->reach = farthest(&s->view);
         s->thickness = thickness(&s->view);
-        if (w->bodies[s->body].type == CAROM_DYNAMIC) length = fmax(length, diameter(&s->view));
+        const crm_body *b = &w->bodies[s->body];
+        if (b->type == CAROM_DYNAMIC && !b->sensor) length = fmax(length, diameter(&s->view));
     }
     if (w->settings.length > 0) length = w->settings.length;
     w->length = length > 0 ? length : 1;

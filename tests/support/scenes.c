@@ -18,7 +18,7 @@ carom_world *scene_world(double g, double dt)
     carom_world *w = NULL;
     s.gravity[1] = -g;
     s.dt = dt;
-    s.integrator = scene_integrator;
+    s.integrator = (int)scene_integrator;
     assert_int_equal(carom_world_create(&s, NULL, &w), CAROM_OK);
     return w;
 }

@@ -10,4 +10,5 @@
 #include "carom/query.h"
 #include "carom/shape.h"
 #include "carom/world.h"
+#include "carom/world_query.h"
 #endif

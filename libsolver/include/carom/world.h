@@ -78,10 +78,12 @@ typedef struct carom_body_def {
     double friction;    /* [1], >= 0 */
     double restitution; /* [1], 0 to 1 */
     int collide;        /* 0: no contacts at all */
+    int sensor;         /* 1: touches nothing; carom_query_sensors tells what overlaps its shapes */
     carom_filter filter;
 } carom_body_def;
 
-/* Dynamic, no shape, mass 1, inertia 1, friction 0.5, restitution 0, collides with all. */
+/* Dynamic, no shape, mass 1, inertia 1, friction 0.5, restitution 0, collides with all, no sensor.
+ */
 CAROM_API carom_body_def carom_body_defaults(void);
 /* The same of a type and at a place [m]. */
 CAROM_API carom_body_def carom_body_at(carom_body_type type, double x, double y);
@@ -116,6 +118,10 @@ CAROM_API carom_status carom_world_add_box(carom_world *world, const carom_body_
  * Joined bodies do not collide with each other. */
 CAROM_API carom_status carom_world_add_revolute(carom_world *world, int body_a, int body_b,
                                                 carom_vec2 anchor, int *index);
+
+/* These two never collide, whatever their filters.  Twice is once.  CAROM_E_ARGUMENT,
+ * CAROM_E_MEMORY; CAROM_E_STATE after the first step. */
+CAROM_API carom_status carom_world_exclude(carom_world *world, int body_a, int body_b);
 
 /* Optional last call of building: freezes the scales L and g, checks the scene, projects or refuses
  * initial overlap, allocates.  The first step does it when the caller did not. */
