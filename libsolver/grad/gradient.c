@@ -25,9 +25,19 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
     const size_t k3 = 3 * (size_t)r->world->n_moving;
     const size_t rows = 2 * (size_t)r->world->n_joints;
-    double **const full[8] = {&r->q_bar,   &r->v_bar,     &r->q_seed, &r->v_seed,
-                              &r->q_event, &r->solve_bar, &r->pose,   &r->pose_bar};
-    for (int k = 0; k < 8; k++) *full[k] = crm_carve(b, n3, sizeof(double));
+    crm_substep *s = &r->work;
+    double **const full[] = {&r->q_bar,    &r->v_bar,   &r->q_seed,  &r->v_seed, &r->q_event,
+                             &r->solve_bar, &r->pose,    &r->pose_bar, &r->q_after, &r->v_after,
+                             &s->q0,        &s->v0,      &s->q1,       &s->v1};
+    for (size_t k = 0; k < sizeof full / sizeof *full; k++) {
+        *full[k] = crm_carve(b, n3, sizeof(double));
+    }
+    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
+        r->solve_q[k] = crm_carve(b, n3, sizeof(double));
+        r->solve_v[k] = crm_carve(b, n3, sizeof(double));
+    }
+    r->clock_bar = crm_carve(b, (size_t)r->world->n_bodies, sizeof(double));
+    r->clock_old = crm_carve(b, (size_t)r->world->n_bodies, sizeof(double));
     r->velocity_bar = crm_carve(b, k3, sizeof(double));
     r->bars.u = crm_carve(b, k3, sizeof(double));
     r->bars.inv_mass = crm_carve(b, k3, sizeof(double));
@@ -81,19 +91,50 @@ static void clear_sink(const crm_reverse *r)
     clear((double *)g->anchors, 4 * (size_t)w->n_joints);
 }
 
-static void drop_negligible(double *x, size_t n, double scale)
+static void drop_negligible(const carom_world *w, double *x, double scale)
 {
-    for (size_t k = 0; k < n; k++) {
-        if (fabs(x[k]) < NEGLIGIBLE * scale) x[k] = 0;
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        double *y = x + 3 * w->island->bodies[i];
+        for (int k = 0; k < 3; k++) {
+            if (fabs(y[k]) < NEGLIGIBLE * scale) y[k] = 0;
+        }
     }
 }
 
-/* q1 and v1 of a sub-step are the start of the next one. */
-static void end_state(const carom_tape *t, int record, crm_substep *s)
+static void scatter(const crm_island *i, const double *from, double *to)
 {
-    const int last = record + 1 == t->n_records;
-    s->q1 = last ? t->q_end : t->records[record + 1].s.q0;
-    s->v1 = last ? t->v_end : t->records[record + 1].s.v0;
+    for (int k = 0; k < i->n_bodies; k++) {
+        memcpy(&to[3 * i->bodies[k]], &from[3 * k], 3 * sizeof *to);
+    }
+}
+
+/* The recorded sub-step with states of world size, in r->work; its island is entered. */
+static void unpack(crm_reverse *r, const crm_record *record)
+{
+    const crm_island *i = &record->island;
+    crm_substep *s = &r->work;
+    double *const q0 = s->q0;
+    double *const v0 = s->v0;
+    double *const q1 = s->q1;
+    double *const v1 = s->v1;
+    *s = record->s;
+    s->moved = r->moved;
+    s->q0 = q0;
+    s->v0 = v0;
+    s->q1 = q1;
+    s->v1 = v1;
+    scatter(i, record->s.q0, s->q0);
+    scatter(i, record->s.v0, s->v0);
+    for (int k = 0; k < s->n_solves; k++) {
+        const crm_solve *c = &record->s.solve[k];
+        s->solve[k].q = c->q ? r->solve_q[k] : s->q0;
+        s->solve[k].v = r->solve_v[k];
+        if (c->q) scatter(i, c->q, s->solve[k].q);
+        scatter(i, c->v, s->solve[k].v);
+    }
+    crm_enter(r->world, i);
+    crm_copy(r->world, s->q1, r->q_after);
+    crm_copy(r->world, s->v1, r->v_after);
 }
 
 /* d gap / d q1 of the closing contact; scaled parameters go to the sink when scale is not 0. */
@@ -114,18 +155,18 @@ static void event_parameters(crm_reverse *r, const crm_substep *s, double scale)
 /* The sub-step ended at the root h* of a gap g: dh* = -(dg/dtheta) / (dg/dh).  With
  * H = h_bar - left_bar, the cotangent of h*, every derivative of g enters with k = -H / (dg/dh):
  * the seed k dg/dq1 is added to q_bar, and k dg/dparameter to the sink. */
-static carom_status locate_vjp(crm_reverse *r, const crm_substep *s, double left_bar)
+static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar)
 {
-    const size_t n3 = 3 * (size_t)r->world->n_bodies;
+    const carom_world *w = r->world;
     double h_bar;
     double slope;
     event_vjp(r, s, r->q_event);
-    memcpy(r->q_seed, r->q_bar, n3 * sizeof(double));
-    memcpy(r->v_seed, r->v_bar, n3 * sizeof(double));
+    crm_copy(w, r->q_seed, r->q_bar);
+    crm_copy(w, r->v_seed, r->v_bar);
     carom_status e = crm_substep_vjp(r, s, r->q_seed, r->v_seed, 0, &h_bar);
     if (e < 0) return e;
-    memcpy(r->q_seed, r->q_event, n3 * sizeof(double));
-    clear(r->v_seed, n3);
+    crm_copy(w, r->q_seed, r->q_event);
+    crm_zero(w, r->v_seed);
     e = crm_substep_vjp(r, s, r->q_seed, r->v_seed, 0, &slope);
     if (e < 0) return e;
     if (fabs(slope) <= GRAZING * r->world->length) {
@@ -133,7 +174,11 @@ static carom_status locate_vjp(crm_reverse *r, const crm_substep *s, double left
         return CAROM_OK;
     }
     const double k = -(h_bar - left_bar) / slope;
-    for (size_t i = 0; i < n3; i++) r->q_bar[i] += k * r->q_event[i];
+    const int ends[2] = {s->event.body_a, s->event.body_b};
+    for (int i = 0; i < 6; i++) {
+        const int x = 3 * ends[i / 3] + i % 3;
+        r->q_bar[x] += k * r->q_event[x];
+    }
     event_parameters(r, s, k);
     return CAROM_OK;
 }
@@ -141,22 +186,23 @@ static carom_status locate_vjp(crm_reverse *r, const crm_substep *s, double left
 /* One sub-step backward; *left_bar is the cotangent of the time left after it, then before it. */
 static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
 {
-    crm_substep s = r->tape->records[record].s;
+    crm_substep *s = &r->work;
     double h_bar;
-    end_state(r->tape, record, &s);
-    if (s.end == CRM_END_EVENT) {
-        const carom_status e = locate_vjp(r, &s, *left_bar);
+    unpack(r, &r->tape->records[record]);
+    if (s->end == CRM_END_EVENT) {
+        const carom_status e = locate_vjp(r, s, *left_bar);
         if (e < 0) return e;
     }
-    const carom_status e = crm_substep_vjp(r, &s, r->q_bar, r->v_bar, 1, &h_bar);
+    const carom_status e = crm_substep_vjp(r, s, r->q_bar, r->v_bar, 1, &h_bar);
     if (e < 0) return e;
-    const size_t n3 = 3 * (size_t)r->world->n_bodies;
-    drop_negligible(r->q_bar, n3, r->scale);
-    drop_negligible(r->v_bar, n3, r->scale);
-    r->stats.degenerate += s.degenerate;
-    switch (s.end) {
+    drop_negligible(r->world, r->q_bar, r->scale);
+    drop_negligible(r->world, r->v_bar, r->scale);
+    crm_copy(r->world, r->q_after, s->q0);
+    crm_copy(r->world, r->v_after, s->v0);
+    r->stats.degenerate += s->degenerate;
+    switch (s->end) {
     case CRM_END_FRAME: *left_bar = h_bar; break;
-    case CRM_END_FRACTION: *left_bar = s.fraction * h_bar + (1 - s.fraction) * *left_bar; break;
+    case CRM_END_FRACTION: *left_bar = s->fraction * h_bar + (1 - s->fraction) * *left_bar; break;
     case CRM_END_IMPACT: break; /* no time passes */
     case CRM_END_EVENT: break;  /* left_before = left_after + h*, and h* is in k */
     }
@@ -165,8 +211,7 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
 
 /* Adds the losses on the state after `step` steps.  A step that ended with an event owes the time
  * `carry` = 0 to the next one; the state at the border moves with it at (v, W f + g). */
-static void add_bars(crm_reverse *r, int step, int n_bars, const carom_state_bar *bars,
-                     double *carry_bar)
+static void add_bars(crm_reverse *r, int step, int n_bars, const carom_state_bar *bars)
 {
     const carom_tape *t = r->tape;
     const carom_world *w = r->world;
@@ -184,12 +229,29 @@ static void add_bars(crm_reverse *r, int step, int n_bars, const carom_state_bar
             r->scale = fmax(r->scale, fmax(fabs(q_bar), fabs(v_bar)));
             r->q_bar[k] += q_bar;
             r->v_bar[k] += v_bar;
-            *carry_bar += q_bar * v[k] + v_bar * (f ? W * f[k] + g : 0);
+            r->clock_bar[b] += q_bar * v[k] + v_bar * (f ? W * f[k] + g : 0);
         }
     }
 }
 
-static carom_status reverse_frame(crm_reverse *r, int frame, double *left_bar)
+/* The time left to an island before its first sub-step is dt and what its clock owes. */
+static void close_island(crm_reverse *r, const crm_record *first, double left_bar)
+{
+    if (r->sink.g.dt) *r->sink.g.dt += left_bar;
+    r->clock_old[first->island.clock] += left_bar;
+}
+
+/* The time owed after the last sub-step of an island: of all its bodies. */
+static double open_island(const crm_reverse *r, const crm_record *last)
+{
+    double left_bar = 0;
+    for (int k = 0; k < last->island.n_bodies; k++) {
+        left_bar += r->clock_bar[last->island.bodies[k]];
+    }
+    return left_bar;
+}
+
+static carom_status reverse_frame(crm_reverse *r, int frame)
 {
     const carom_tape *t = r->tape;
     const int first = t->frames[frame].first_record;
@@ -197,11 +259,19 @@ static carom_status reverse_frame(crm_reverse *r, int frame, double *left_bar)
     const int before = r->stats.degenerate;
     double *steps = r->sink.g.force_steps;
     r->sink.force_step = steps ? steps + 3 * (size_t)r->world->n_bodies * (size_t)frame : NULL;
+    const crm_record *records = t->records;
+    double left_bar = 0;
+    clear(r->clock_old, (size_t)r->world->n_bodies);
     for (int k = end - 1; k >= first; k--) {
-        const carom_status e = reverse_record(r, k, left_bar);
+        const crm_record *x = &records[k];
+        if (k == end - 1 || records[k + 1].which != x->which) left_bar = open_island(r, x);
+        const carom_status e = reverse_record(r, k, &left_bar);
         if (e < 0) return e;
+        if (k == first || records[k - 1].which != x->which) close_island(r, x, left_bar);
     }
-    if (r->sink.g.dt) *r->sink.g.dt += *left_bar;
+    double *const swap = r->clock_bar;
+    r->clock_bar = r->clock_old;
+    r->clock_old = swap;
     if (r->stats.degenerate > before) r->stats.first_degenerate_step = frame + 1;
     return CAROM_OK;
 }
@@ -209,17 +279,27 @@ static carom_status reverse_frame(crm_reverse *r, int frame, double *left_bar)
 static carom_status reverse_all(crm_reverse *r, int n_bars, const carom_state_bar *bars)
 {
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
-    double left_bar = 0;
+    const carom_tape *t = r->tape;
+    double *const states[] = {r->work.q0, r->work.q1, r->pose, r->q_after};
+    for (size_t k = 0; k < sizeof states / sizeof *states; k++) {
+        memcpy(states[k], t->q_end, n3 * sizeof(double));
+    }
+    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
+        memcpy(r->solve_q[k], t->q_end, n3 * sizeof(double));
+        clear(r->solve_v[k], n3);
+    }
+    memcpy(r->v_after, t->v_end, n3 * sizeof(double));
+    clear(r->clock_bar, (size_t)r->world->n_bodies);
     clear(r->q_bar, n3);
     clear(r->v_bar, n3);
     clear_sink(r);
     r->stats.first_degenerate_step = -1;
     for (int frame = r->tape->n_frames - 1; frame >= 0; frame--) {
-        add_bars(r, frame + 1, n_bars, bars, &left_bar);
-        const carom_status e = reverse_frame(r, frame, &left_bar);
+        add_bars(r, frame + 1, n_bars, bars);
+        const carom_status e = reverse_frame(r, frame);
         if (e < 0) return e;
     }
-    add_bars(r, 0, n_bars, bars, &left_bar);
+    add_bars(r, 0, n_bars, bars);
     for (int b = 0; b < r->world->n_bodies; b++) {
         if (r->world->bodies[b].type == CAROM_STATIC) clear(&r->v_bar[3 * b], 3);
     }

@@ -5,9 +5,12 @@
 #include "carom/grad.h"
 #include "world/internal.h"
 
-/* One recorded sub-step: a crm_substep whose arrays lie in one block of exact size. */
+/* One recorded sub-step: a crm_substep whose arrays lie in one block of exact size, states as three
+ * numbers per body of its island. */
 typedef struct crm_record {
     crm_substep s;
+    crm_island island; /* without pairs */
+    int which;         /* number of the island in its frame */
     void *block;
     size_t bytes;
 } crm_record;
@@ -16,6 +19,7 @@ typedef struct crm_record {
 typedef struct crm_frame {
     int first_record; /* of this step */
     double *force;    /* 3 n_bodies */
+    double *q, *v;    /* 3 n_bodies: state before this step */
 } crm_frame;
 
 struct carom_tape {
@@ -45,13 +49,18 @@ typedef struct crm_reverse {
     double *q_bar, *v_bar; /* 3 n_bodies: state under way */
     double *q_seed, *v_seed;
     double *q_event;      /* 3 n_bodies: d gap / d q1 */
-    double *velocity_bar; /* 3 n_moving */
+    double *velocity_bar; /* 3 per body of the island */
     double *gap_bar;      /* per contact */
     carom_contact_bars bars;
     double *solve_bar;  /* 3 n_bodies: cotangent of the velocity of the solve under way */
     double *pose;       /* 3 n_bodies: end of an iteration of stage 1 */
     double *pose_bar;   /* 3 n_bodies: its cotangent */
     crm_contact *moved; /* contacts at the pose of the problem under way */
+    crm_substep work;   /* the sub-step under way, states of world size */
+    double *solve_q[CRM_MAX_SOLVES], *solve_v[CRM_MAX_SOLVES]; /* its arrays */
+    double *q_after, *v_after;     /* 3 n_bodies: state after it */
+    double *clock_bar, *clock_old; /* per body: cotangent of the time owed to the next step, of the
+                                    * frame under way and of the one after it */
     void *block;
     size_t bytes;
     carom_gradient_stats stats;
@@ -97,6 +106,6 @@ carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, doubl
                             int with_parameters, double *h_bar);
 carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
                             int with_parameters);
-carom_status crm_substep_vjp(crm_reverse *r, const crm_substep *s, double *q_bar, double *v_bar,
+carom_status crm_substep_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
                              int with_parameters, double *h_bar);
 #endif

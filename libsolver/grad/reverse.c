@@ -5,9 +5,8 @@
 
 static void gather(const carom_world *w, const double *full, double *moving)
 {
-    for (int b = 0; b < w->n_bodies; b++) {
-        const int i = crm_unknown(w, b);
-        if (i >= 0) memcpy(&moving[3 * i], &full[3 * b], 3 * sizeof(double));
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        memcpy(&moving[3 * i], &full[3 * w->island->bodies[i]], 3 * sizeof(double));
     }
 }
 
@@ -15,6 +14,11 @@ carom_status crm_solve_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, c
 {
     carom_world *w = r->world;
     const carom_contact_problem p = crm_solve_problem(w, s, c);
+    if (!p.n_contacts && !p.n_joint_rows) {
+        gather(w, v_bar, r->bars.u);
+        memset(r->bars.inv_mass, 0, 3 * (size_t)p.n_bodies * sizeof(double));
+        return CAROM_OK;
+    }
     gather(w, c->v, w->rows.v);
     gather(w, v_bar, r->velocity_bar);
     const carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
@@ -30,8 +34,8 @@ void crm_mass_vjp(crm_reverse *r)
     const carom_gradient *g = &r->sink.g;
     const double *W_bar = r->bars.inv_mass;
     if (!g->mass && !g->inertia) return;
-    for (int b = 0; b < w->n_bodies; b++) {
-        const int i = crm_unknown(w, b);
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i];
         if (w->bodies[b].type != CAROM_DYNAMIC) continue;
         const double m = w->mass[b];
         if (g->mass) g->mass[b] -= (W_bar[3 * i + 1] + W_bar[3 * i + 2]) / (m * m);
@@ -44,9 +48,9 @@ void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, double h, doubl
 {
     const carom_world *w = r->world;
     const carom_gradient *g = &r->sink.g;
-    for (int b = 0; b < w->n_bodies; b++) {
-        const int i = crm_unknown(w, b);
-        for (int k = 0; i >= 0 && k < 3; k++) {
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i];
+        for (int k = 0; k < 3; k++) {
             const double W = w->rows.inv_mass[3 * i + k];
             const double u_bar = r->bars.u[3 * i + k];
             const int falls = w->bodies[b].type == CAROM_DYNAMIC && k > 0;
@@ -127,8 +131,8 @@ void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, cons
         crm_geometry_vjp(r, c->q, &s->moved[k], &bar, q_bar, with_parameters);
         if (with_parameters && rough) add_friction(r, &s->moved[k], r->bars.mu[k]);
     }
-    for (int k = 0; k < r->world->n_joints; k++) {
-        crm_joint_vjp(r, c->q, k, &r->bars.je[12 * k], error_bar ? &error_bar[2 * k] : NULL, q_bar,
+    for (int k = 0; k < r->world->island->n_joints; k++) {
+        crm_joint_vjp(r, c->q, r->world->island->joints[k], &r->bars.je[12 * k], error_bar ? &error_bar[2 * k] : NULL, q_bar,
                       with_parameters);
     }
 }
@@ -147,8 +151,8 @@ static carom_status correction_vjp(crm_reverse *r, crm_substep *s, const crm_sol
 void crm_move_vjp(const carom_world *w, const crm_substep *s, const double *v, const double *q_bar,
                   double *v_bar, double *h_bar)
 {
-    for (int b = 0; b < w->n_bodies; b++) {
-        if (crm_unknown(w, b) < 0) continue;
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i];
         for (int k = 3 * b; k < 3 * b + 3; k++) {
             v_bar[k] += s->h * q_bar[k];
             *h_bar += q_bar[k] * v[k];
@@ -168,7 +172,7 @@ carom_status crm_euler_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double
     crm_move_vjp(r->world, s, c->v, q_bar, v_bar, h_bar);
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
-    memset(v_bar, 0, 3 * (size_t)r->world->n_bodies * sizeof *v_bar);
+    crm_zero(r->world, v_bar);
     crm_free_velocity_vjp(r, s, s->h, 1, v_bar, h_bar, with_parameters);
     if (with_parameters) crm_mass_vjp(r);
     crm_targets_vjp(r, s, s->v0, v_bar, r->gap_bar, h_bar, with_parameters);
@@ -183,7 +187,7 @@ carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, doubl
     double none = 0;
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
-    memset(v_bar, 0, 3 * (size_t)r->world->n_bodies * sizeof *v_bar);
+    crm_zero(r->world, v_bar);
     crm_free_velocity_vjp(r, s, 0, 0, v_bar, &none, with_parameters);
     if (with_parameters) crm_mass_vjp(r);
     crm_targets_vjp(r, s, s->v0, v_bar, r->gap_bar, &none, with_parameters);
@@ -191,16 +195,14 @@ carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, doubl
     return CAROM_OK;
 }
 
-carom_status crm_substep_vjp(crm_reverse *r, const crm_substep *recorded, double *q_bar,
-                             double *v_bar, int with_parameters, double *h_bar)
+carom_status crm_substep_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
+                             int with_parameters, double *h_bar)
 {
-    crm_substep s = *recorded;
-    s.moved = r->moved;
     *h_bar = 0;
-    switch (s.map) {
-    case CRM_MAP_IMPACT: return crm_impact_vjp(r, &s, q_bar, v_bar, with_parameters);
-    case CRM_MAP_SMOOTH: return crm_smooth_vjp(r, &s, q_bar, v_bar, with_parameters, h_bar);
+    switch (s->map) {
+    case CRM_MAP_IMPACT: return crm_impact_vjp(r, s, q_bar, v_bar, with_parameters);
+    case CRM_MAP_SMOOTH: return crm_smooth_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
     case CRM_MAP_EULER: break;
     }
-    return crm_euler_vjp(r, &s, q_bar, v_bar, with_parameters, h_bar);
+    return crm_euler_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
 }

@@ -61,7 +61,8 @@ static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int k, const do
                            const double *p, double *v_bar, double *h_bar, int with_parameters)
 {
     const carom_world *w = r->world;
-    const crm_joint *j = &w->joints[k];
+    const int joint = w->island->joints[k];
+    const crm_joint *j = &w->joints[joint];
     static const double none[12] = {0};
     double je[12];
     double error[2];
@@ -75,7 +76,7 @@ static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int k, const do
         error_bar[i] = ce_bar / s->h;
         *h_bar -= ce_bar * error[i] / (s->h * s->h);
     }
-    crm_joint_vjp(r, p, k, none, error_bar, r->pose_bar, with_parameters);
+    crm_joint_vjp(r, p, joint, none, error_bar, r->pose_bar, with_parameters);
 }
 
 /* Right-hand sides from the velocity v of the fixed point, which ends at p = q0 + h v. */
@@ -83,16 +84,15 @@ static void sides_vjp(crm_reverse *r, const crm_substep *s, const double *v, dou
                       double *q0_bar, double *h_bar, int with_parameters)
 {
     const carom_world *w = r->world;
-    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
     double *p = r->pose;
-    memcpy(p, s->q0, bytes);
+    crm_copy(w, p, s->q0);
     crm_move(w, p, v, s->h);
-    memset(r->pose_bar, 0, bytes);
+    memset(r->pose_bar, 0, 3 * (size_t)w->n_bodies * sizeof(double));
     for (int k = 0; k < s->n_contacts; k++) {
         r->gap_bar[k] = 0;
         contact_side_vjp(r, s, k, v, p, v_bar, q0_bar, h_bar, with_parameters);
     }
-    for (int k = 0; k < w->n_joints; k++) {
+    for (int k = 0; k < w->island->n_joints; k++) {
         joint_side_vjp(r, s, k, v, p, v_bar, h_bar, with_parameters);
     }
     crm_move_vjp(w, s, v, r->pose_bar, v_bar, h_bar);
@@ -106,7 +106,7 @@ static carom_status pass_vjp(crm_reverse *r, crm_substep *s, double *q0_bar, dou
     const crm_solve *c = &s->solve[0];
     const carom_status e = crm_solve_vjp(r, s, c, r->solve_bar);
     if (e < 0) return e;
-    memset(r->solve_bar, 0, 3 * (size_t)r->world->n_bodies * sizeof(double));
+    crm_zero(r->world, r->solve_bar);
     crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, v0_bar, h_bar, with_parameters);
     if (with_parameters) crm_mass_vjp(r);
     sides_vjp(r, s, c->v, r->solve_bar, q0_bar, h_bar, with_parameters);
@@ -114,10 +114,13 @@ static carom_status pass_vjp(crm_reverse *r, crm_substep *s, double *q0_bar, dou
     return CAROM_OK;
 }
 
-static double largest(int n, const double *x)
+static double largest(const carom_world *w, const double *x)
 {
     double top = 0;
-    for (int k = 0; k < n; k++) top = fmax(top, fabs(x[k]));
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const double *y = x + 3 * w->island->bodies[i];
+        top = fmax(top, fmax(fabs(y[0]), fmax(fabs(y[1]), fabs(y[2]))));
+    }
     return top;
 }
 
@@ -128,7 +131,7 @@ static carom_status stage_2_vjp(crm_reverse *r, crm_substep *s, double *q_bar, c
     const crm_solve *c = &s->solve[1];
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
-    memset(r->solve_bar, 0, 3 * (size_t)r->world->n_bodies * sizeof(double));
+    crm_zero(r->world, r->solve_bar);
     crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, r->solve_bar, h_bar, with_parameters);
     if (with_parameters) crm_mass_vjp(r);
     for (int k = 0; k < s->n_contacts; k++) {
@@ -143,16 +146,15 @@ static carom_status stage_2_vjp(crm_reverse *r, crm_substep *s, double *q_bar, c
 carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
                             int with_parameters, double *h_bar)
 {
-    const int n = 3 * r->world->n_bodies;
     *h_bar = 0;
     carom_status e = stage_2_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
     crm_move_vjp(r->world, s, s->solve[0].v, q_bar, r->solve_bar, h_bar);
-    memset(v_bar, 0, (size_t)n * sizeof *v_bar);
-    const double first = largest(n, r->solve_bar);
+    crm_zero(r->world, v_bar);
+    const double first = largest(r->world, r->solve_bar);
     for (int k = 0; e >= 0 && k < MAX_PASSES; k++) {
-        if (largest(n, r->solve_bar) <= PASS_TOL * first) return CAROM_OK;
+        if (largest(r->world, r->solve_bar) <= PASS_TOL * first) return CAROM_OK;
         e = pass_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
     }
     if (e < 0) return e;
-    return largest(n, r->solve_bar) <= PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
+    return largest(r->world, r->solve_bar) <= PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
 }

@@ -14,16 +14,25 @@ static void *keep(crm_block *b, const void *from, size_t n, size_t size)
     return to;
 }
 
-/* Which rows a kind of solve needs its own right-hand sides of. */
-static void keep_solve(const carom_tape *t, const crm_substep *s, int index, crm_block *b,
+/* Three numbers per body of the island. */
+static double *keep_state(const crm_island *i, const double *full, crm_block *b)
+{
+    double *to = crm_carve(b, 3 * (size_t)i->n_bodies, sizeof *to);
+    for (int k = 0; to && k < i->n_bodies; k++) {
+        memcpy(&to[3 * k], &full[3 * i->bodies[k]], 3 * sizeof *to);
+    }
+    return to;
+}
+
+static void keep_solve(const crm_island *i, const crm_substep *s, int index, crm_block *b,
                        crm_solve *to)
 {
     const crm_solve *c = &s->solve[index];
     const size_t m = (size_t)s->n_contacts;
-    const size_t rows = 2 * (size_t)t->world->n_joints;
-    const int first_pose = c->kind == CRM_CORRECTION || c->kind == CRM_STAGE_2;
-    to->q = first_pose ? keep(b, c->q, n3(t), sizeof(double)) : NULL;
-    to->v = keep(b, c->v, n3(t), sizeof(double));
+    const size_t rows = 2 * (size_t)i->n_joints;
+    const int own_pose = c->kind == CRM_CORRECTION || c->kind == CRM_STAGE_2;
+    to->q = own_pose ? keep_state(i, c->q, b) : NULL;
+    to->v = keep_state(i, c->v, b);
     to->cn = keep(b, c->cn, m, sizeof(double));
     to->ct = keep(b, c->ct, m, sizeof(double));
     to->ln = keep(b, c->ln, m, sizeof(double));
@@ -34,29 +43,32 @@ static void keep_solve(const carom_tape *t, const crm_substep *s, int index, crm
 }
 
 /* Copies what the reverse pass needs of a sub-step into a block; measures when b->base is NULL. */
-static void pack(const carom_tape *t, const crm_substep *s, crm_block *b, crm_substep *to)
+static void pack(const crm_island *i, const crm_substep *s, crm_block *b, crm_record *to)
 {
     const size_t m = (size_t)s->n_contacts;
-    *to = *s;
-    to->moved = NULL;
-    to->pressing = NULL;
-    to->state_block = NULL;
-    to->contact_block = NULL;
-    to->q0 = keep(b, s->q0, n3(t), sizeof(double));
-    to->v0 = keep(b, s->v0, n3(t), sizeof(double));
-    to->q1 = NULL;
-    to->v1 = NULL;
-    to->contacts = keep(b, s->contacts, m, sizeof *s->contacts);
-    to->target = keep(b, s->target, m, sizeof(double));
-    for (int k = 0; k < s->n_solves; k++) {
-        keep_solve(t, s, k, b, &to->solve[k]);
-        if (!to->solve[k].q) to->solve[k].q = to->q0;
-    }
+    to->s = *s;
+    to->s.moved = NULL;
+    to->s.pressing = NULL;
+    to->s.state_block = NULL;
+    to->s.contact_block = NULL;
+    to->island = *i;
+    to->island.n_pairs = 0;
+    to->island.pairs = NULL;
+    to->island.bodies = keep(b, i->bodies, (size_t)i->n_bodies, sizeof(int));
+    to->island.joints = keep(b, i->joints, (size_t)i->n_joints, sizeof(int));
+    to->s.q0 = keep_state(i, s->q0, b);
+    to->s.v0 = keep_state(i, s->v0, b);
+    to->s.q1 = NULL;
+    to->s.v1 = NULL;
+    to->s.contacts = keep(b, s->contacts, m, sizeof *s->contacts);
+    to->s.target = keep(b, s->target, m, sizeof(double));
+    for (int k = 0; k < s->n_solves; k++) keep_solve(i, s, k, b, &to->s.solve[k]);
 }
 
 static carom_status record_substep(void *user, const crm_substep *s)
 {
     carom_tape *t = user;
+    const crm_island *island = t->world->island;
     void *records = t->records;
     carom_status e =
         crm_reserve(&t->memory, &records, &t->max_records, t->n_records + 1, sizeof *t->records);
@@ -64,14 +76,15 @@ static carom_status record_substep(void *user, const crm_substep *s)
     if (e) return e;
     crm_record *r = &t->records[t->n_records];
     crm_block b = {NULL, 0};
-    pack(t, s, &b, &r->s);
+    pack(island, s, &b, r);
     r->bytes = b.used;
     r->block = crm_new(&t->memory, b.used, 1);
     if (!r->block) return CAROM_E_MEMORY;
     b.base = r->block;
     b.used = 0;
-    pack(t, s, &b, &r->s);
+    pack(island, s, &b, r);
     r->s.force = t->frames[t->n_frames].force;
+    r->which = (int)(island - t->world->islands.list);
     t->n_records++;
     return CAROM_OK;
 }
@@ -83,6 +96,13 @@ static void drop_records(carom_tape *t, int n)
         crm_record *r = &t->records[--t->n_records];
         crm_free(&t->memory, r->block, r->bytes, 1);
     }
+}
+
+/* The frame under way is run again. */
+static void restart_frame(void *user)
+{
+    carom_tape *t = user;
+    drop_records(t, t->frames[t->n_frames].first_record);
 }
 
 static void keep_end(carom_tape *t)
@@ -121,7 +141,7 @@ void carom_tape_destroy(carom_tape *tape)
     if (!tape) return;
     drop_records(tape, 0);
     for (int k = 0; k < tape->max_frames; k++) {
-        crm_free(&tape->memory, tape->frames[k].force, n3(tape), sizeof(double));
+        crm_free(&tape->memory, tape->frames[k].force, 3 * n3(tape), sizeof(double));
     }
     crm_free(&tape->memory, tape->records, (size_t)tape->max_records, sizeof *tape->records);
     crm_free(&tape->memory, tape->frames, (size_t)tape->max_frames, sizeof *tape->frames);
@@ -136,11 +156,11 @@ void carom_tape_rewind(carom_tape *tape)
     drop_records(tape, 0);
     tape->n_frames = 0;
     tape->revision = tape->world->revision;
-    tape->world->carry = 0;
+    crm_forget_clocks(tape->world);
     keep_end(tape);
 }
 
-/* The frame of the coming step; its force array is kept for reuse after a rewind. */
+/* The frame of the coming step; its arrays, one block, are kept for reuse after a rewind. */
 static carom_status open_frame(carom_tape *t, const double *force)
 {
     const carom_world *w = t->world;
@@ -150,8 +170,12 @@ static carom_status open_frame(carom_tape *t, const double *force)
     t->frames = frames;
     if (e) return e;
     crm_frame *f = &t->frames[t->n_frames];
-    if (!f->force) f->force = crm_new(&t->memory, n3(t), sizeof(double));
+    if (!f->force) f->force = crm_new(&t->memory, 3 * n3(t), sizeof(double));
     if (!f->force) return CAROM_E_MEMORY;
+    f->q = f->force + n3(t);
+    f->v = f->q + n3(t);
+    memcpy(f->q, w->q, n3(t) * sizeof(double));
+    memcpy(f->v, w->v, n3(t) * sizeof(double));
     f->first_record = t->n_records;
     for (size_t k = 0; k < n3(t); k++) f->force[k] = w->force[k] + (force ? force[k] : 0);
     return CAROM_OK;
@@ -175,7 +199,7 @@ carom_status carom_tape_step(carom_tape *tape, const double *force, carom_step_s
     carom_status e = open_frame(tape, force);
     if (e) return crm_world_fail(w, e, "no memory to record step %ld", w->n_steps + 1);
     const int first = tape->n_records;
-    const crm_recorder recorder = {record_substep, tape};
+    const crm_recorder recorder = {record_substep, restart_frame, tape};
     w->recorder = recorder;
     e = carom_world_step(w, force, stats);
     memset(&w->recorder, 0, sizeof w->recorder);
@@ -202,12 +226,12 @@ const double *carom_tape_q(const carom_tape *tape, int step)
 {
     if (!tape || step < 0 || step > tape->n_frames) return NULL;
     if (step == tape->n_frames) return tape->q_end;
-    return tape->records[tape->frames[step].first_record].s.q0;
+    return tape->frames[step].q;
 }
 
 const double *carom_tape_v(const carom_tape *tape, int step)
 {
     if (!tape || step < 0 || step > tape->n_frames) return NULL;
     if (step == tape->n_frames) return tape->v_end;
-    return tape->records[tape->frames[step].first_record].s.v0;
+    return tape->frames[step].v;
 }

@@ -4,6 +4,10 @@
 #include <math.h>
 #include <stdlib.h>
 
+/* Circles around shapes are larger than they need to be, for rounding and for shapes that derivative
+ * checks have changed a little. */
+static const double CUSHION = 1.01;
+
 static long body_key(const carom_world *w, int a, int b)
 {
     return a < b ? (long)a * w->n_bodies + b : (long)b * w->n_bodies + a;
@@ -49,39 +53,6 @@ int crm_may_collide(const carom_world *w, carom_pair pair)
     if (a->sensor || b->sensor) return 0;
     if (a->type != CAROM_DYNAMIC && b->type != CAROM_DYNAMIC) return 0;
     return crm_may_meet(w, ia, ib);
-}
-
-static carom_box grown(carom_box x, double margin)
-{
-    const carom_box y = {{x.lower.x - margin, x.lower.y - margin},
-                         {x.upper.x + margin, x.upper.y + margin}};
-    return y;
-}
-
-static carom_box joined_box(carom_box a, carom_box b)
-{
-    const carom_box c = {{fmin(a.lower.x, b.lower.x), fmin(a.lower.y, b.lower.y)},
-                         {fmax(a.upper.x, b.upper.x), fmax(a.upper.y, b.upper.y)}};
-    return c;
-}
-
-/* Overlaps nothing: no step pays for a sensor. */
-static carom_box no_box(void)
-{
-    const carom_box none = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
-    return none;
-}
-
-carom_status crm_candidates(carom_world *w, const double *q0, const double *q1, double margin,
-                            int *n_pairs, const carom_pair **pairs)
-{
-    for (int k = 0; k < w->n_shapes; k++) {
-        const crm_shape *s = &w->shapes[k];
-        carom_box box = carom_shape_box(&s->view, crm_pose(q0, s->body));
-        if (q1 != q0) box = joined_box(box, carom_shape_box(&s->view, crm_pose(q1, s->body)));
-        w->boxes[k] = w->bodies[s->body].sensor ? no_box() : grown(box, 0.5 * margin);
-    }
-    return carom_broadphase_pairs(w->broadphase, w->n_shapes, w->boxes, n_pairs, pairs);
 }
 
 carom_manifold crm_collide(const carom_world *w, carom_pair pair, const double *q, double margin)
@@ -153,18 +124,28 @@ static carom_status add_contacts(carom_world *w, carom_pair pair, const carom_ma
     return crm_rows_reserve(w, s->n_contacts);
 }
 
+int crm_far_apart(const carom_world *w, carom_pair pair, const double *q, double margin)
+{
+    const crm_shape *a = &w->shapes[pair.a];
+    const crm_shape *b = &w->shapes[pair.b];
+    const double dx = q[3 * b->body + 1] - q[3 * a->body + 1];
+    const double dy = q[3 * b->body + 2] - q[3 * a->body + 2];
+    const double reach = CUSHION * (a->reach + b->reach) + margin;
+    return dx * dx + dy * dy > reach * reach;
+}
+
 carom_status crm_detect(carom_world *w, const double *q, double margin)
 {
-    int n;
-    const carom_pair *pairs;
-    carom_status e = crm_candidates(w, q, q, margin, &n, &pairs);
+    const crm_island *island = w->island;
     w->sub.n_contacts = 0;
-    for (int k = 0; e >= 0 && k < n; k++) {
-        if (!crm_may_collide(w, pairs[k])) continue;
-        const carom_manifold m = crm_collide(w, pairs[k], q, margin);
-        if (m.count) e = add_contacts(w, pairs[k], &m, q, margin);
+    for (int k = 0; k < island->n_pairs; k++) {
+        const carom_pair pair = island->pairs[k];
+        if (crm_far_apart(w, pair, q, margin)) continue;
+        const carom_manifold m = crm_collide(w, pair, q, margin);
+        const carom_status e = m.count ? add_contacts(w, pair, &m, q, margin) : CAROM_OK;
+        if (e) return e;
     }
-    return e;
+    return CAROM_OK;
 }
 
 /* How far a point of the body can get within h at velocity v [m]. */
@@ -178,19 +159,17 @@ static double travel(const carom_world *w, int shape, const double *v, double h)
 carom_status crm_detect_ahead(carom_world *w, const double *q, const double *v, double h,
                               double margin)
 {
-    int n;
-    const carom_pair *pairs;
-    double longest = 0;
-    for (int k = 0; k < w->n_shapes; k++) longest = fmax(longest, travel(w, k, v, h));
-    carom_status e = crm_candidates(w, q, q, margin + 2 * longest, &n, &pairs);
+    const crm_island *island = w->island;
     w->sub.n_contacts = 0;
-    for (int k = 0; e >= 0 && k < n; k++) {
-        if (!crm_may_collide(w, pairs[k])) continue;
-        const double reach = travel(w, pairs[k].a, v, h) + travel(w, pairs[k].b, v, h);
-        const carom_manifold m = crm_collide(w, pairs[k], q, margin + reach);
-        if (m.count) e = add_contacts(w, pairs[k], &m, q, margin);
+    for (int k = 0; k < island->n_pairs; k++) {
+        const carom_pair pair = island->pairs[k];
+        const double reach = margin + travel(w, pair.a, v, h) + travel(w, pair.b, v, h);
+        if (crm_far_apart(w, pair, q, reach)) continue;
+        const carom_manifold m = crm_collide(w, pair, q, reach);
+        const carom_status e = m.count ? add_contacts(w, pair, &m, q, margin) : CAROM_OK;
+        if (e) return e;
     }
-    return e;
+    return CAROM_OK;
 }
 
 void crm_contact_refresh(const carom_world *w, const double *q, crm_contact *c)

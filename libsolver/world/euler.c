@@ -44,14 +44,14 @@ static void withdraw(carom_world *w, const crm_substep *s)
 {
     const crm_rows *r = &w->rows;
     const crm_solve *c = &s->solve[0];
-    memset(r->u, 0, 3 * (size_t)w->n_moving * sizeof(double));
+    memset(r->u, 0, 3 * (size_t)w->island->n_bodies * sizeof(double));
     for (int k = 0; k < s->n_contacts; k++) {
         if (s->pressing[k]) add_row(r->u, &r->contact_body[2 * k], &r->jn[6 * k], -s->h * c->ln[k]);
     }
-    for (int k = 0; k < 2 * w->n_joints; k++) {
+    for (int k = 0; k < 2 * w->island->n_joints; k++) {
         add_row(r->u, &r->joint_body[2 * k], &r->je[6 * k], -s->h * c->le[k]);
     }
-    for (int k = 0; k < 3 * w->n_moving; k++) r->u[k] *= r->inv_mass[k];
+    for (int k = 0; k < 3 * w->island->n_bodies; k++) r->u[k] *= r->inv_mass[k];
 }
 
 /* Largest overlap, gap of a pressing contact or joint error at the rows [m]. */
@@ -62,7 +62,7 @@ static double violation(const carom_world *w, const crm_substep *s)
         const double gap = s->moved[k].gap;
         largest = fmax(largest, s->pressing[k] ? fabs(gap) : -gap);
     }
-    for (int k = 0; k < 2 * w->n_joints; k++) largest = fmax(largest, fabs(w->rows.error[k]));
+    for (int k = 0; k < 2 * w->island->n_joints; k++) largest = fmax(largest, fabs(w->rows.error[k]));
     return largest;
 }
 
@@ -72,7 +72,7 @@ static void set_sides(const carom_world *w, const crm_substep *s, crm_solve *c)
         c->cn[k] = s->moved[k].gap;
         c->ct[k] = 0;
     }
-    for (int k = 0; k < 2 * w->n_joints; k++) c->ce[k] = w->rows.error[k];
+    for (int k = 0; k < 2 * w->island->n_joints; k++) c->ce[k] = w->rows.error[k];
 }
 
 /* One correction at c->q, rows in place: displacement, modes, and the multipliers added. */
@@ -88,7 +88,7 @@ static carom_status correct(carom_world *w, crm_substep *s, crm_solve *c)
     for (int k = 0; k < s->n_contacts; k++) {
         if (s->pressing[k]) c->ln[k] -= s->h * step->ln[k];
     }
-    for (int k = 0; k < 2 * w->n_joints; k++) c->le[k] -= s->h * step->le[k];
+    for (int k = 0; k < 2 * w->island->n_joints; k++) c->le[k] -= s->h * step->le[k];
     return CAROM_OK;
 }
 
@@ -96,8 +96,8 @@ static carom_status correct(carom_world *w, crm_substep *s, crm_solve *c)
  * know what is held. */
 static void correct_nothing(const carom_world *w, const crm_substep *s, crm_solve *c)
 {
-    memset(c->v, 0, 3 * (size_t)w->n_bodies * sizeof *c->v);
-    for (int k = 0; k < 2 * w->n_joints; k++) c->le[k] = 0;
+    crm_zero(w, c->v);
+    for (int k = 0; k < 2 * w->island->n_joints; k++) c->le[k] = 0;
     for (int k = 0; k < s->n_contacts; k++) {
         c->ln[k] = 0;
         c->lt[k] = 0;
@@ -107,14 +107,14 @@ static void correct_nothing(const carom_world *w, const crm_substep *s, crm_solv
 carom_status crm_project(carom_world *w, crm_substep *s)
 {
     const double tol = POSITION_TOL * w->length + crm_rounding(w);
-    if (!s->n_contacts && !w->n_joints) return CAROM_OK;
+    if (!s->n_contacts && !w->island->n_joints) return CAROM_OK;
     for (int k = 1; k <= CRM_MAX_CORRECTIONS; k++) {
         crm_solve *c = &s->solve[k];
         crm_rows_at(w, s, s->q1);
         const double worst = violation(w, s);
         if (k > 1 && worst <= tol) break;
         c->kind = CRM_CORRECTION;
-        memcpy(c->q, s->q1, 3 * (size_t)w->n_bodies * sizeof(double));
+        crm_copy(w, c->q, s->q1);
         set_sides(w, s, c);
         for (int i = 0; i < s->n_contacts; i++) {
             const int closed = s->pressing[i] || (k > 1 && c[-1].mode[i]);
@@ -137,18 +137,17 @@ carom_status crm_euler(carom_world *w, double h)
 {
     crm_substep *s = &w->sub;
     crm_solve *c = &s->solve[0];
-    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
     s->map = CRM_MAP_EULER;
     s->h = h;
     s->n_solves = 1;
     c->kind = CRM_VELOCITY;
-    memcpy(c->q, s->q0, bytes);
+    crm_copy(w, c->q, s->q0);
     crm_rows_at(w, s, s->q0);
     crm_free_velocity(w, s, s->v0, h);
     const carom_status e = crm_solve_bounce(w, s, c, s->v0);
     if (e < 0) return e;
-    memcpy(s->v1, c->v, bytes);
-    memcpy(s->q1, s->q0, bytes);
+    crm_copy(w, s->v1, c->v);
+    crm_copy(w, s->q1, s->q0);
     crm_move(w, s->q1, c->v, h);
     mark_pressing(s);
     return crm_project(w, s);

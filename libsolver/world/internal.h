@@ -23,7 +23,8 @@ typedef struct crm_body {
     int n_shapes;
     int collide;
     int sensor;
-    int unknown; /* index among the moving bodies, -1: static */
+    int unknown;  /* index in the island under way, -1: static */
+    double reach; /* farthest point of its shapes from the position [m]; set by seal */
     carom_filter filter;
 } crm_body;
 
@@ -135,17 +136,55 @@ typedef struct crm_rows {
     size_t contact_bytes;
 } crm_rows;
 
-/* A contact and how it was: the first guess for the next sub-step. */
-typedef struct crm_guess {
-    int shape_a;
-    int shape_b;
-    carom_recipe recipe;
+/* A contact of an island's last sub-step and how it was: the first guess for the next one. */
+typedef struct crm_touch {
+    crm_contact contact; /* at the start of the sub-step */
+    carom_vec2 point;    /* on A, world [m] */
+    double ln, lt;
     unsigned char mode;
-} crm_guess;
+} crm_touch;
 
-/* Told of every accepted sub-step. */
+/* Touches ordered by shape pair: those of the last frame, and those of the frame under way in the
+ * order of islands. */
+typedef struct crm_touches {
+    int n, max;
+    crm_touch *list;
+} crm_touches;
+
+/* Moving bodies that joints and pairs which may touch within the frame connect, ascending.  A
+ * sub-step is one island's; static bodies belong to none. */
+typedef struct crm_island {
+    int n_bodies;
+    int *bodies;
+    int n_joints;
+    int *joints;
+    int n_pairs;
+    carom_pair *pairs; /* shapes; also with static bodies */
+    int clock;         /* the body whose owed time the frame takes over */
+} crm_island;
+
+typedef struct crm_islands {
+    int n;
+    crm_island *list;
+    int *root, *label;     /* per body */
+    unsigned char *linked; /* per body: in a pair or joint */
+    int *bodies, *joints;
+    double *ahead;  /* 3 n_bodies: the way foreseen for the frame */
+    double *slack;  /* per body: room around it [m] */
+    double *excess; /* per body: more room, after it was left [m] */
+    int escaped;    /* 1: a body left its room */
+    carom_box *boxes;
+    int n_pairs, max_found, max_pairs;
+    carom_pair *found; /* all that may touch within the frame */
+    carom_pair *pairs; /* the same by island */
+    void *block;
+    size_t bytes;
+} crm_islands;
+
+/* Told of every accepted sub-step, and when those of a frame are void. */
 typedef struct crm_recorder {
     carom_status (*substep)(void *user, const crm_substep *s);
+    void (*restart)(void *user);
     void *user;
 } crm_recorder;
 
@@ -174,23 +213,29 @@ struct carom_world {
     int sealed;
     int n_moving;
     double length;     /* L [m] */
-    int smooth;        /* 1: located, two-stage map; 0: Euler */
+    int smooth;        /* 1: two-stage map; 0: Euler */
     double speed;      /* sqrt(g L) [m/s] */
     double rest_speed; /* v_rest [m/s] */
     void *seal_block;  /* the arrays made by seal */
     size_t seal_bytes;
     double *step_force; /* 3 n_bodies: of the present step, constant + given */
-    carom_box *boxes;   /* n_shapes */
     long *joined;       /* sorted keys of joined body pairs */
     carom_broadphase *broadphase;
     carom_contact_solver *solver;
     crm_rows rows;
     crm_substep sub;
     double *q_saved, *v_saved; /* 3 n_bodies: for a failed step */
-    int n_guess, max_guess;    /* contacts and modes of the last accepted sub-step */
-    crm_guess *guess;
-    long revision; /* counts changes of parameters */
-    double carry;  /* time owed to the next step: always 0, but with a derivative */
+    double *carry;       /* per body: time owed to the next step, 0 but for rounding and derivative */
+    unsigned char *owes; /* per body: the last step ended with an event */
+    double *carry_saved;
+    unsigned char *owes_saved;
+    int statics_placed;  /* 1: the states of sub hold the static bodies */
+    crm_islands islands; /* of the frame under way */
+    const crm_island *island; /* under way */
+    int n_substeps;           /* of the island in this frame */
+    crm_touches touches, next;
+    int first_touch; /* of the island, in next */
+    long revision;   /* counts changes of parameters */
     long n_steps;
     carom_step_stats *stats; /* of the step under way */
     crm_recorder recorder;
@@ -220,11 +265,14 @@ static inline carom_vec2 crm_rotate(double angle, carom_vec2 v)
 /* Requests so far of the world and of all that it owns. */
 long crm_allocations(const carom_world *w);
 
-/* A moving body's index in contact problems; -1 for static ones. */
+/* A moving body's index in the contact problems of its island; -1 for static ones. */
 static inline int crm_unknown(const carom_world *w, int body)
 {
     return w->bodies[body].unknown;
 }
+
+/* world.c: no body owes time to the next step. */
+void crm_forget_clocks(carom_world *w);
 
 /* build.c: room for one more body; also makes the arrays of an empty world. */
 carom_status crm_reserve_bodies(carom_world *w);
@@ -237,20 +285,34 @@ static inline int crm_filters_meet(const carom_filter *a, const carom_filter *b)
     return (a->category & b->mask) && (b->category & a->mask);
 }
 
-/* detect.c */
+/* islands.c */
+carom_status crm_islands_create(carom_world *w);
+void crm_islands_free(carom_world *w);
+/* Islands of what may touch within dt from the world's state; dt = 0: of what touches. */
+carom_status crm_islands_find(carom_world *w, double dt);
+/* The same again with more room for the bodies that left theirs; *changed: other pairs. */
+carom_status crm_islands_widen(carom_world *w, int *changed);
+/* Notes which bodies of the island have left their room, from the frame's start to q. */
+void crm_islands_watch(carom_world *w, const double *from, const double *q);
+/* From now on `island` is under way. */
+void crm_enter(carom_world *w, const crm_island *island);
+/* World-sized arrays, three numbers per body: only those of the island. */
+void crm_copy(const carom_world *w, double *to, const double *from);
+void crm_zero(const carom_world *w, double *x);
+
+/* detect.c: in the island under way. */
 /* Contacts at q with gap <= margin, ordered by shape pair, into sub.contacts. */
 carom_status crm_detect(carom_world *w, const double *q, double margin);
 /* The same with every contact point that velocities like v could close within h, speculative. */
 carom_status crm_detect_ahead(carom_world *w, const double *q, const double *v, double h,
                               double margin);
-/* Shape pairs whose boxes, grown by margin and swept from q0 to q1, overlap. */
-carom_status crm_candidates(carom_world *w, const double *q0, const double *q1, double margin,
-                            int *n_pairs, const carom_pair **pairs);
 /* Filters, joints and exclusions: whether two bodies can meet at all; sealed worlds. */
 int crm_may_meet(const carom_world *w, int body_a, int body_b);
 /* ... and types and sensors: whether the shapes of a pair collide. */
 int crm_may_collide(const carom_world *w, carom_pair pair);
 carom_manifold crm_collide(const carom_world *w, carom_pair pair, const double *q, double margin);
+/* Whether circles around the two bodies are farther apart than margin. */
+int crm_far_apart(const carom_world *w, carom_pair pair, const double *q, double margin);
 /* Signed distance of the pair at q0 + at (q1 - q0). */
 double crm_distance_between(const carom_world *w, carom_pair pair, const double *q0,
                             const double *q1, double at);
@@ -275,6 +337,8 @@ void crm_contact_rows(const crm_contact *c, double jn[6], double jt[6]);
 void crm_joint_rows(const crm_joint *j, const double *q, double je[12], double error[2]);
 /* Rows of all contacts and joints at q into w->rows, joint errors, inverse masses; sub.moved. */
 void crm_rows_at(carom_world *w, crm_substep *s, const double *q);
+/* W f + g of a body at the forces of this step. */
+void crm_free_acceleration(const carom_world *w, int body, double a[3]);
 /* rows.u = v + h (W f + g). */
 void crm_free_velocity(carom_world *w, const crm_substep *s, const double *v, double h);
 /* The problem of the rows in place with the right-hand sides of one solve. */
@@ -304,9 +368,12 @@ carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, cons
 void crm_move(const carom_world *w, double *q, const double *v, double scale);
 /* Rounding error of a position difference, from the farthest body [m]. */
 double crm_rounding(const carom_world *w);
-/* Modes of sub.solve[0] from the last accepted sub-step. */
+/* Modes of sub.solve[0] from the last accepted sub-step of the island. */
 void crm_guess_load(carom_world *w);
-carom_status crm_guess_save(carom_world *w);
+/* Contacts of sub as the island's touches. */
+carom_status crm_touches_save(carom_world *w);
+/* The frame is done: next becomes the touches, ordered. */
+void crm_touches_turn(carom_world *w);
 
 /* The maps: from (q0, v0) of w->sub to (q1, v1). */
 carom_status crm_euler(carom_world *w, double h);  /* euler.c */

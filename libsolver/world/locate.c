@@ -165,6 +165,7 @@ static void consider_pair(search *f, carom_pair pair)
         consider(f, &x);
         return;
     }
+    if (crm_far_apart(f->w, pair, s->q1, f->hit)) return;
     const carom_manifold m = crm_collide(f->w, pair, s->q1, f->hit);
     if (!m.count) return;
     x.g1 = m.distance;
@@ -172,7 +173,7 @@ static void consider_pair(search *f, carom_pair pair)
 }
 
 /* The earliest watched gap that has closed at q1, into *found; 0 when there is none. */
-static carom_status first_closed(carom_world *w, watch *found, int *any)
+static void first_closed(carom_world *w, watch *found, int *any)
 {
     const double noise = crm_rounding(w);
     search f = {w,
@@ -180,25 +181,18 @@ static carom_status first_closed(carom_world *w, watch *found, int *any)
                 CRM_HIT_TOL * w->length + noise,
                 0,
                 {{0, 0}, 0, {0}, 0, 0, 0, 1, 0}};
-    int n;
     int cursor = 0;
-    const carom_pair *pairs;
-    const crm_substep *s = &w->sub;
-    const carom_status e = crm_candidates(w, s->q0, s->q1, f.hit, &n, &pairs);
-    if (e < 0) return e;
-    w->stats->n_candidates = n;
-    for (int k = 0; k < n; k++) {
-        if (!crm_may_collide(w, pairs[k])) continue;
-        const int c = held(s, pairs[k], &cursor);
+    for (int k = 0; k < w->island->n_pairs; k++) {
+        const carom_pair pair = w->island->pairs[k];
+        const int c = held(&w->sub, pair, &cursor);
         if (c >= 0) {
-            consider_features(&f, pairs[k], c);
+            consider_features(&f, pair, c);
         } else {
-            consider_pair(&f, pairs[k]);
+            consider_pair(&f, pair);
         }
     }
     *any = f.any;
     *found = f.best;
-    return CAROM_OK;
 }
 
 /* h in (0, *h] with gap(q1(h)) = 0: Illinois, then bisection.  Leaves sub evaluated at *h. */
@@ -266,9 +260,9 @@ static carom_status go_to_event(carom_world *w, watch x, double left)
     for (int round = 0; round < MAX_ROUNDS; round++) {
         watch next;
         int any;
-        carom_status e = find_root(w, &x, &h);
-        if (e >= 0) e = first_closed(w, &next, &any);
+        const carom_status e = find_root(w, &x, &h);
         if (e < 0) return e;
+        first_closed(w, &next, &any);
         if (!any || next.touches || same_watch(&x, &next)) break;
         x = next;
         h *= next.at;
@@ -308,8 +302,8 @@ carom_status crm_locate(carom_world *w, double left)
     if (e < 0 || s->end != CRM_END_FRAME) return e;
     watch x;
     int any;
-    e = first_closed(w, &x, &any);
-    if (e < 0 || !any) return e;
+    first_closed(w, &x, &any);
+    if (!any) return e;
     if (x.touches) {
         set_event(w, &x);
         return CAROM_OK;

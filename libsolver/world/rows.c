@@ -85,11 +85,12 @@ static void fill_contacts(carom_world *w, const crm_substep *s)
 static void fill_joints(carom_world *w, const double *q)
 {
     crm_rows *r = &w->rows;
-    for (int k = 0; k < w->n_joints; k++) {
-        crm_joint_rows(&w->joints[k], q, &r->je[12 * k], &r->error[2 * k]);
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        crm_joint_rows(j, q, &r->je[12 * k], &r->error[2 * k]);
         for (int i = 2 * k; i < 2 * k + 2; i++) {
-            r->joint_body[2 * i] = crm_unknown(w, w->joints[k].body_a);
-            r->joint_body[2 * i + 1] = crm_unknown(w, w->joints[k].body_b);
+            r->joint_body[2 * i] = crm_unknown(w, j->body_a);
+            r->joint_body[2 * i + 1] = crm_unknown(w, j->body_b);
         }
     }
 }
@@ -108,9 +109,8 @@ double crm_joint_drift(const carom_world *w, const double *q)
 
 static void fill_inverse_masses(carom_world *w)
 {
-    for (int b = 0; b < w->n_bodies; b++) {
-        const int i = crm_unknown(w, b);
-        if (i < 0) continue;
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i];
         const int moves = w->bodies[b].type == CAROM_DYNAMIC;
         w->rows.inv_mass[3 * i] = moves ? 1 / w->inertia[b] : 0;
         w->rows.inv_mass[3 * i + 1] = moves ? 1 / w->mass[b] : 0;
@@ -129,11 +129,20 @@ void crm_rows_at(carom_world *w, crm_substep *s, const double *q)
     fill_joints(w, q);
 }
 
+void crm_free_acceleration(const carom_world *w, int body, double a[3])
+{
+    const double *f = &w->step_force[3 * body];
+    a[0] = a[1] = a[2] = 0;
+    if (w->bodies[body].type != CAROM_DYNAMIC) return;
+    a[0] = f[0] / w->inertia[body];
+    a[1] = f[1] / w->mass[body] + w->settings.gravity[0];
+    a[2] = f[2] / w->mass[body] + w->settings.gravity[1];
+}
+
 void crm_free_velocity(carom_world *w, const crm_substep *s, const double *v, double h)
 {
-    for (int b = 0; b < w->n_bodies; b++) {
-        const int i = crm_unknown(w, b);
-        if (i < 0) continue;
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i];
         const int falls = w->bodies[b].type == CAROM_DYNAMIC;
         for (int k = 0; k < 3; k++) {
             const double g = falls && k > 0 ? w->settings.gravity[k - 1] : 0;
@@ -147,9 +156,9 @@ carom_contact_problem crm_problem(carom_world *w, const crm_substep *s, const cr
 {
     const crm_rows *r = &w->rows;
     carom_contact_problem p = {0};
-    p.n_bodies = w->n_moving;
+    p.n_bodies = w->island->n_bodies;
     p.n_contacts = s->n_contacts;
-    p.n_joint_rows = 2 * w->n_joints;
+    p.n_joint_rows = 2 * w->island->n_joints;
     p.inv_mass = r->inv_mass;
     p.u = r->u;
     p.contact_body = r->contact_body;
@@ -179,7 +188,7 @@ void crm_velocity_targets(carom_world *w, const crm_substep *s, const double *v,
             c->cn[k] = s->restitution * e * un;
         }
     }
-    for (int k = 0; k < 2 * w->n_joints; k++) c->ce[k] = 0;
+    for (int k = 0; k < 2 * w->island->n_joints; k++) c->ce[k] = 0;
 }
 
 carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const crm_solve *c)
@@ -187,7 +196,7 @@ carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const cr
     crm_rows_at(w, s, c->q);
     switch (c->kind) {
     case CRM_VELOCITY: crm_free_velocity(w, s, s->v0, s->h); break;
-    case CRM_CORRECTION: memset(w->rows.u, 0, 3 * (size_t)w->n_moving * sizeof(double)); break;
+    case CRM_CORRECTION: memset(w->rows.u, 0, 3 * (size_t)w->island->n_bodies * sizeof(double)); break;
     case CRM_IMPACT: crm_free_velocity(w, s, s->v0, 0); break;
     case CRM_STAGE_1: crm_free_velocity(w, s, s->v0, 0.5 * s->h); break;
     case CRM_STAGE_2: crm_free_velocity(w, s, c[-1].v, 0.5 * s->h); break;

@@ -6,9 +6,6 @@
 
 /* Rounds of detection and projection for an overlapping initial scene. */
 enum { MAX_ROUNDS = 50 };
-/* Moving bodies up to which `located` runs its second-order map.  Without islands every impact and
- * every Newton iteration solves the whole world: beyond this the Euler map is used instead. */
-enum { LOCATED_BODIES = 48 };
 
 static double farthest(const carom_shape *s)
 {
@@ -54,11 +51,13 @@ static double thickness(const carom_shape *s)
 static void set_scales(carom_world *w)
 {
     double length = 0;
+    for (int b = 0; b < w->n_bodies; b++) w->bodies[b].reach = 0;
     for (int k = 0; k < w->n_shapes; k++) {
         crm_shape *s = &w->shapes[k];
         s->reach = farthest(&s->view);
         s->thickness = thickness(&s->view);
-        const crm_body *b = &w->bodies[s->body];
+        crm_body *b = &w->bodies[s->body];
+        b->reach = fmax(b->reach, s->reach);
         if (b->type == CAROM_DYNAMIC && !b->sensor) length = fmax(length, diameter(&s->view));
     }
     if (w->settings.length > 0) length = w->settings.length;
@@ -68,13 +67,14 @@ static void set_scales(carom_world *w)
     w->rest_speed = w->settings.rest_speed * w->speed;
 }
 
-static void number_unknowns(carom_world *w)
+static void count_moving(carom_world *w)
 {
     w->n_moving = 0;
     for (int b = 0; b < w->n_bodies; b++) {
-        w->bodies[b].unknown = w->bodies[b].type == CAROM_STATIC ? -1 : w->n_moving++;
+        w->bodies[b].unknown = -1;
+        w->n_moving += w->bodies[b].type != CAROM_STATIC;
     }
-    w->smooth = w->settings.integrator == CAROM_LOCATED && w->n_moving <= LOCATED_BODIES;
+    w->smooth = w->settings.integrator != CAROM_EULER;
 }
 
 static void lay_world(carom_world *w, crm_block *b)
@@ -83,7 +83,10 @@ static void lay_world(carom_world *w, crm_block *b)
     w->step_force = crm_carve(b, n3, sizeof(double));
     w->q_saved = crm_carve(b, n3, sizeof(double));
     w->v_saved = crm_carve(b, n3, sizeof(double));
-    w->boxes = crm_carve(b, (size_t)w->n_shapes, sizeof *w->boxes);
+    w->carry = crm_carve(b, (size_t)w->n_bodies, sizeof(double));
+    w->carry_saved = crm_carve(b, (size_t)w->n_bodies, sizeof(double));
+    w->owes = crm_carve(b, (size_t)w->n_bodies, 1);
+    w->owes_saved = crm_carve(b, (size_t)w->n_bodies, 1);
     w->joined = crm_carve(b, (size_t)w->n_joints, sizeof *w->joined);
 }
 
@@ -98,6 +101,7 @@ static carom_status allocate(carom_world *w)
     b.used = 0;
     lay_world(w, &b);
     carom_status e = crm_rows_create(w);
+    if (!e) e = crm_islands_create(w);
     if (!e) e = crm_substep_create(w, &w->sub);
     return e;
 }
@@ -112,49 +116,75 @@ static int deepest(const crm_substep *s)
     return k;
 }
 
-static carom_status project_once(carom_world *w)
+static carom_status project_island(carom_world *w)
 {
     crm_substep *s = &w->sub;
-    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
-    memcpy(s->q1, w->q, bytes);
+    crm_copy(w, s->q1, w->q);
     memset(s->pressing, 0, (size_t)s->n_contacts);
     s->map = CRM_MAP_EULER;
     s->h = 0;
     const carom_status e = crm_project(w, s);
-    if (e < 0) return e;
-    memcpy(w->q, s->q1, bytes);
-    return CAROM_OK;
+    if (e >= 0) crm_copy(w, w->q, s->q1);
+    return e;
+}
+
+/* The overlap of the initial scene. */
+typedef struct overlap {
+    double tol, worst;
+    int a, b; /* bodies of the worst */
+} overlap;
+
+/* One round over all islands; *any: there was an overlap. */
+static carom_status clear_islands(carom_world *w, int round, overlap *o, int *any)
+{
+    *any = 0;
+    carom_status e = crm_islands_find(w, 0);
+    for (int i = 0; e >= 0 && i < w->islands.n; i++) {
+        crm_enter(w, &w->islands.list[i]);
+        o->tol = w->settings.penetration * w->length + crm_rounding(w);
+        e = crm_detect(w, w->q, w->settings.margin * w->length);
+        const int k = deepest(&w->sub);
+        if (e < 0 || k < 0 || -w->sub.contacts[k].gap <= o->tol) continue;
+        *any = 1;
+        if (round == 0 && -w->sub.contacts[k].gap > o->worst) {
+            o->worst = -w->sub.contacts[k].gap;
+            o->a = w->sub.contacts[k].body_a;
+            o->b = w->sub.contacts[k].body_b;
+        }
+        if (w->settings.project_overlap) e = project_island(w);
+    }
+    return e;
+}
+
+static carom_status clear_rounds(carom_world *w, overlap *o)
+{
+    for (int round = 0; round <= MAX_ROUNDS; round++) {
+        int any;
+        const carom_status e = clear_islands(w, round, o, &any);
+        if (e < 0 || !any) return e;
+        if (!w->settings.project_overlap) break;
+    }
+    return crm_world_fail(w, CAROM_E_ARGUMENT,
+                          "bodies %d and %d overlap by %.3g m at the start; move them apart", o->a,
+                          o->b, o->worst);
 }
 
 /* Overlap of the initial scene is projected away, or refused by setting. */
 static carom_status clear_overlap(carom_world *w)
 {
-    const double tol = w->settings.penetration * w->length + crm_rounding(w);
-    double worst = 0;
-    int a = 0;
-    int b = 0;
-    for (int round = 0; round <= MAX_ROUNDS; round++) {
-        const carom_status e = crm_detect(w, w->q, w->settings.margin * w->length);
-        if (e < 0) return e;
-        const int k = deepest(&w->sub);
-        const double depth = k < 0 ? 0 : -w->sub.contacts[k].gap;
-        if (round == 0 && depth > tol) {
-            worst = depth;
-            a = w->sub.contacts[k].body_a;
-            b = w->sub.contacts[k].body_b;
-        }
-        if (depth <= tol) break;
-        if (!w->settings.project_overlap || round == MAX_ROUNDS) {
-            return crm_world_fail(
-                w, CAROM_E_ARGUMENT,
-                "bodies %d and %d overlap by %.3g m at the start; move them apart", a, b, worst);
-        }
-        const carom_status p = project_once(w);
-        if (p < 0) return p;
+    overlap o = {0, 0, 0, 0};
+    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
+    memcpy(w->q_saved, w->q, bytes);
+    memcpy(w->sub.q1, w->q, bytes);
+    for (int k = 0; k < CRM_MAX_SOLVES; k++) memcpy(w->sub.solve[k].q, w->q, bytes);
+    const carom_status e = clear_rounds(w, &o);
+    if (e < 0) {
+        memcpy(w->q, w->q_saved, bytes);
+        return e;
     }
-    if (worst > 0) {
+    if (o.worst > 0) {
         crm_world_fail(w, CAROM_OK, "initial overlap of %.3g m (bodies %d and %d) projected away",
-                       worst, a, b);
+                       o.worst, o.a, o.b);
     }
     return CAROM_OK;
 }
@@ -165,7 +195,7 @@ carom_status crm_seal(carom_world *w)
     carom_step_stats own = {0};
     carom_step_stats *stats = w->stats;
     set_scales(w);
-    number_unknowns(w);
+    count_moving(w);
     carom_status e = allocate(w);
     if (!e) {
         crm_sort_joined(w);

@@ -24,6 +24,7 @@ typedef struct word {
 static const word WORDS[] = {
     {"integrator", "located", CAROM_LOCATED},
     {"integrator", "euler", CAROM_EULER},
+    {"integrator", "fixed", CAROM_FIXED},
     {"combine_friction", "mean", CAROM_COMBINE_MEAN},
     {"combine_friction", "geometric", CAROM_COMBINE_GEOMETRIC},
     {"combine_friction", "min", CAROM_COMBINE_MIN},

@@ -29,12 +29,12 @@ static void first_sides(const carom_world *w, const crm_substep *s, crm_solve *c
         c->cn[k] = (s->contacts[k].gap - s->target[k]) / s->h;
         c->ct[k] = 0;
     }
-    for (int k = 0; k < 2 * w->n_joints; k++) c->ce[k] = w->rows.error[k] / s->h;
+    for (int k = 0; k < 2 * w->island->n_joints; k++) c->ce[k] = w->rows.error[k] / s->h;
 }
 
 static double joint_row_dot(const carom_world *w, int row, const double *v)
 {
-    const crm_joint *j = &w->joints[row / 2];
+    const crm_joint *j = &w->joints[w->island->joints[row / 2]];
     return crm_row_dot(&w->rows.je[6 * row], v, j->body_a, j->body_b);
 }
 
@@ -62,10 +62,10 @@ static double next_sides(const carom_world *w, const crm_substep *s, const crm_s
             largest = fmax(largest, s->h * fabs(next->ct[k] - c->ct[k]));
         }
     }
-    for (int k = 0; k < w->n_joints; k++) {
+    for (int k = 0; k < w->island->n_joints; k++) {
         double je[12];
         double error[2];
-        crm_joint_rows(&w->joints[k], s->q1, je, error);
+        crm_joint_rows(&w->joints[w->island->joints[k]], s->q1, je, error);
         for (int i = 2 * k; i < 2 * k + 2; i++) {
             next->ce[i] = error[i % 2] / s->h - joint_row_dot(w, i, c->v);
             largest = fmax(largest, s->h * fabs(next->ce[i] - c->ce[i]));
@@ -76,7 +76,7 @@ static double next_sides(const carom_world *w, const crm_substep *s, const crm_s
 
 static void end_pose(const carom_world *w, crm_substep *s, const crm_solve *c)
 {
-    memcpy(s->q1, s->q0, 3 * (size_t)w->n_bodies * sizeof(double));
+    crm_copy(w, s->q1, s->q0);
     crm_move(w, s->q1, c->v, s->h);
 }
 
@@ -87,7 +87,7 @@ static void take_sides(const carom_world *w, const crm_substep *s, const crm_sol
         to->cn[k] = from->cn[k];
         to->ct[k] = from->ct[k];
     }
-    for (int k = 0; k < 2 * w->n_joints; k++) to->ce[k] = from->ce[k];
+    for (int k = 0; k < 2 * w->island->n_joints; k++) to->ce[k] = from->ce[k];
 }
 
 /* Stage 1: M vh = M v0 + h/2 f + J0' l with gaps, slips and joints met at q1 = q0 + h vh. */
@@ -96,7 +96,7 @@ static carom_status stage_1(carom_world *w, crm_substep *s)
     const double tol = NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
     crm_solve *c = &s->solve[0];
     c->kind = CRM_STAGE_1;
-    memcpy(c->q, s->q0, 3 * (size_t)w->n_bodies * sizeof(double));
+    crm_copy(w, c->q, s->q0);
     crm_rows_at(w, s, s->q0);
     crm_free_velocity(w, s, s->v0, 0.5 * s->h);
     set_targets(w, s);
@@ -106,7 +106,7 @@ static carom_status stage_1(carom_world *w, crm_substep *s)
         const carom_status e = crm_solve_run(w, s, c, 1);
         if (e < 0) return e;
         end_pose(w, s, c);
-        if (!s->n_contacts && !w->n_joints) return CAROM_OK;
+        if (!s->n_contacts && !w->island->n_joints) return CAROM_OK;
         moved = next_sides(w, s, c, &s->solve[1]);
         if (moved <= tol) return CAROM_OK;
         if (!(moved < FAR * w->length)) return CAROM_E_NO_SOLUTION;
@@ -123,7 +123,7 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
     const crm_solve *last = &s->solve[0];
     crm_solve *c = &s->solve[1];
     c->kind = CRM_STAGE_2;
-    memcpy(c->q, s->q1, 3 * (size_t)w->n_bodies * sizeof(double));
+    crm_copy(w, c->q, s->q1);
     crm_rows_at(w, s, s->q1);
     crm_free_velocity(w, s, last->v, 0.5 * s->h);
     for (int k = 0; k < s->n_contacts; k++) {
@@ -131,11 +131,11 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
         c->ct[k] = 0;
         c->mode[k] = last->mode[k];
     }
-    for (int k = 0; k < 2 * w->n_joints; k++) c->ce[k] = 0;
+    for (int k = 0; k < 2 * w->island->n_joints; k++) c->ce[k] = 0;
     const carom_status e = crm_solve_run(w, s, c, 1);
     if (e < 0) return e;
     s->n_solves = 2;
-    memcpy(s->v1, c->v, 3 * (size_t)w->n_bodies * sizeof(double));
+    crm_copy(w, s->v1, c->v);
     return CAROM_OK;
 }
 
@@ -153,19 +153,18 @@ carom_status crm_impact(carom_world *w)
 {
     crm_substep *s = &w->sub;
     crm_solve *c = &s->solve[0];
-    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
     s->map = CRM_MAP_IMPACT;
     s->h = 0;
     s->n_solves = 1;
     s->end = CRM_END_IMPACT;
     c->kind = CRM_IMPACT;
-    memcpy(c->q, s->q0, bytes);
+    crm_copy(w, c->q, s->q0);
     crm_rows_at(w, s, s->q0);
     crm_free_velocity(w, s, s->v0, 0);
     const carom_status e = crm_solve_bounce(w, s, c, s->v0);
     if (e < 0) return e;
-    memcpy(s->v1, c->v, bytes);
-    memcpy(s->q1, s->q0, bytes);
+    crm_copy(w, s->v1, c->v);
+    crm_copy(w, s->q1, s->q0);
     return e;
 }
 
@@ -178,13 +177,14 @@ static double approach(const crm_substep *s, int k)
     return crm_row_dot(jn, s->v0, c->body_a, c->body_b);
 }
 
-/* Fastest point of a moving body [m/s]. */
+/* Fastest point of a body of the island [m/s]. */
 static double top_speed(const carom_world *w, const double *v)
 {
     double top = 0;
-    for (int k = 0; k < w->n_shapes; k++) {
-        const double *vb = v + 3 * w->shapes[k].body;
-        top = fmax(top, hypot(vb[1], vb[2]) + fabs(vb[0]) * w->shapes[k].reach);
+    for (int k = 0; k < w->island->n_bodies; k++) {
+        const int b = w->island->bodies[k];
+        const double *vb = v + 3 * b;
+        top = fmax(top, hypot(vb[1], vb[2]) + fabs(vb[0]) * w->bodies[b].reach);
     }
     return top;
 }

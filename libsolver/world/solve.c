@@ -3,11 +3,13 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdlib.h>
 
 double crm_rounding(const carom_world *w)
 {
     double far = 0;
-    for (int b = 0; b < w->n_bodies; b++) {
+    for (int k = 0; k < w->island->n_bodies; k++) {
+        const int b = w->island->bodies[k];
         far = fmax(far, fmax(fabs(w->q[3 * b + 1]), fabs(w->q[3 * b + 2])));
     }
     return 8 * DBL_EPSILON * far;
@@ -15,8 +17,8 @@ double crm_rounding(const carom_world *w)
 
 void crm_move(const carom_world *w, double *q, const double *v, double scale)
 {
-    for (int b = 0; b < w->n_bodies; b++) {
-        if (crm_unknown(w, b) < 0) continue;
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i];
         for (int k = 3 * b; k < 3 * b + 3; k++) q[k] += scale * v[k];
     }
 }
@@ -31,8 +33,21 @@ static void add_stats(carom_world *w, const carom_contact_stats *c)
     if (c->stage > s->stage) s->stage = c->stage;
 }
 
+static void take_velocities(const carom_world *w, const double *v, double *to)
+{
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i];
+        for (int k = 0; k < 3; k++) to[3 * b + k] = v[3 * i + k];
+    }
+}
+
 carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use_guess)
 {
+    if (!s->n_contacts && !w->island->n_joints) {
+        s->degenerate = 0;
+        take_velocities(w, w->rows.u, c->v);
+        return CAROM_OK;
+    }
     carom_contact_stats stats = {0};
     const carom_contact_problem p = crm_problem(w, s, c);
     carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
@@ -40,10 +55,7 @@ carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use
     if (e < 0) return e;
     add_stats(w, &stats);
     if (c->kind != CRM_CORRECTION) s->degenerate = stats.degenerate;
-    for (int b = 0; b < w->n_bodies; b++) {
-        const int i = crm_unknown(w, b);
-        for (int k = 0; k < 3; k++) c->v[3 * b + k] = i < 0 ? 0 : w->rows.v[3 * i + k];
-    }
+    take_velocities(w, w->rows.v, c->v);
     return e;
 }
 
@@ -60,44 +72,88 @@ carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, cons
     return again;
 }
 
-static int before(const crm_guess *g, const crm_contact *c)
+static int before(const crm_touch *t, const crm_contact *c)
 {
-    return g->shape_a < c->shape_a || (g->shape_a == c->shape_a && g->shape_b < c->shape_b);
+    const crm_contact *x = &t->contact;
+    return x->shape_a < c->shape_a || (x->shape_a == c->shape_a && x->shape_b < c->shape_b);
 }
 
-/* Both lists are ordered by shape pair: one merge. */
+/* The first of t[n] whose pair is not before that of c. */
+static int find_pair(int n, const crm_touch *t, const crm_contact *c)
+{
+    int low = 0;
+    for (int high = n; low < high;) {
+        const int middle = (low + high) / 2;
+        if (before(&t[middle], c)) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
 void crm_guess_load(carom_world *w)
 {
     crm_substep *s = &w->sub;
-    int g = 0;
+    const int again = w->n_substeps > 0;
+    const crm_touch *t = again ? w->next.list + w->first_touch : w->touches.list;
+    const int n = again ? w->next.n - w->first_touch : w->touches.n;
     for (int k = 0; k < s->n_contacts; k++) {
         const crm_contact *c = &s->contacts[k];
         unsigned char *mode = &s->solve[0].mode[k];
-        while (g < w->n_guess && before(&w->guess[g], c)) g++;
         *mode = c->speculative ? CAROM_SEPARATED : CAROM_STICK;
-        for (int i = g; i < w->n_guess && w->guess[i].shape_a == c->shape_a &&
-                        w->guess[i].shape_b == c->shape_b;
+        for (int i = find_pair(n, t, c); i < n && t[i].contact.shape_a == c->shape_a &&
+                                         t[i].contact.shape_b == c->shape_b;
              i++) {
-            if (crm_recipe_same(w->guess[i].recipe, c->recipe)) *mode = w->guess[i].mode;
+            if (crm_recipe_same(t[i].contact.recipe, c->recipe)) *mode = t[i].mode;
         }
     }
 }
 
-carom_status crm_guess_save(carom_world *w)
+carom_status crm_touches_save(carom_world *w)
 {
     const crm_substep *s = &w->sub;
-    void *p = w->guess;
+    crm_touches *t = &w->next;
+    void *p = t->list;
     const carom_status e =
-        crm_reserve(&w->memory, &p, &w->max_guess, s->n_contacts, sizeof *w->guess);
-    w->guess = p;
+        crm_reserve(&w->memory, &p, &t->max, w->first_touch + s->n_contacts, sizeof *t->list);
+    t->list = p;
     if (e) return e;
-    w->n_guess = s->n_contacts;
+    t->n = w->first_touch;
     for (int k = 0; k < s->n_contacts; k++) {
         const crm_contact *c = &s->contacts[k];
-        const crm_guess g = {c->shape_a, c->shape_b, c->recipe, s->solve[0].mode[k]};
-        w->guess[k] = g;
+        const carom_vec2 point = {s->q0[3 * c->body_a + 1] + c->arm_a.x,
+                                  s->q0[3 * c->body_a + 2] + c->arm_a.y};
+        const crm_touch x = {*c, point, s->solve[0].ln[k], s->solve[0].lt[k], s->solve[0].mode[k]};
+        t->list[t->n++] = x;
     }
     return CAROM_OK;
+}
+
+/* By shape pair; contacts of one pair keep their order, for they are next to each other. */
+static int compare_touches(const void *x, const void *y)
+{
+    const crm_touch *a = x;
+    const crm_touch *b = y;
+    if (before(a, &b->contact)) return -1;
+    if (before(b, &a->contact)) return 1;
+    return (a->contact.recipe.inc > b->contact.recipe.inc) -
+           (a->contact.recipe.inc < b->contact.recipe.inc);
+}
+
+void crm_touches_turn(carom_world *w)
+{
+    const crm_touches last = w->touches;
+    w->touches = w->next;
+    w->next = last;
+    w->next.n = 0;
+    crm_touches *t = &w->touches;
+    for (int k = 1; k < t->n; k++) {
+        if (!before(&t->list[k], &t->list[k - 1].contact)) continue;
+        qsort(t->list, (size_t)t->n, sizeof *t->list, compare_touches);
+        return;
+    }
 }
 
 carom_status crm_map_run(carom_world *w, double h)

@@ -5,14 +5,15 @@
 
 /* Time below this fraction of a step is carried into the next one. */
 static const double CARRY_TOL = 1e-13;
-/* Moving bodies times sub-steps in one step, and sub-steps beyond all counting. */
+/* Moving bodies times sub-steps of one frame, and sub-steps beyond all counting. */
 enum { BODY_SUBSTEPS = 512, MAX_SUBSTEPS = 256 };
+/* How often pairs are looked for again when bodies leave the room foreseen for them. */
+enum { MAX_WIDENINGS = 4 };
 
 static void begin_substep(carom_world *w)
 {
-    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
-    memcpy(w->sub.q0, w->q, bytes);
-    memcpy(w->sub.v0, w->v, bytes);
+    crm_copy(w, w->sub.q0, w->q);
+    crm_copy(w, w->sub.v0, w->v);
     w->sub.force = w->step_force;
 }
 
@@ -22,7 +23,6 @@ static carom_status find_contacts(carom_world *w, double left, int last)
 {
     const double margin = w->settings.margin * w->length;
     if (!last) return crm_detect(w, w->q, margin);
-    if (w->stats->status < CAROM_LIMIT) w->stats->status = CAROM_LIMIT;
     return crm_detect_ahead(w, w->q, w->v, left, margin);
 }
 
@@ -40,35 +40,42 @@ static int bounced(const crm_substep *s)
 static carom_status commit(carom_world *w)
 {
     const crm_substep *s = &w->sub;
-    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
-    carom_status e = crm_guess_save(w);
+    carom_status e = crm_touches_save(w);
     if (!e && w->recorder.substep) e = w->recorder.substep(w->recorder.user, s);
     if (e) return e;
-    memcpy(w->q, s->q1, bytes);
-    memcpy(w->v, s->v1, bytes);
-    w->stats->n_substeps += s->map != CRM_MAP_IMPACT;
+    crm_copy(w, w->q, s->q1);
+    crm_copy(w, w->v, s->v1);
+    crm_islands_watch(w, w->q_saved, w->q);
+    w->n_substeps += s->map != CRM_MAP_IMPACT;
     w->stats->n_events +=
         s->map == CRM_MAP_EULER ? s->end == CRM_END_EVENT || bounced(s) : bounced(s);
-    w->stats->n_contacts = s->n_contacts;
     w->stats->degenerate += s->degenerate;
     return CAROM_OK;
 }
 
-/* Sub-steps of one step: every impact costs solves of the whole world, so large worlds get fewer.
- */
+/* Sub-steps of the island in one frame: an impact solves all of it, so large ones get fewer. */
 static int substeps_allowed(const carom_world *w)
 {
-    int n = w->n_moving > 0 ? BODY_SUBSTEPS / w->n_moving : BODY_SUBSTEPS;
-    if (n < 2) n = 2;
+    if (w->settings.integrator == CAROM_FIXED) return 1;
+    const int n = w->island->n_bodies > 0 ? BODY_SUBSTEPS / w->island->n_bodies : BODY_SUBSTEPS;
+    if (n < 1 || !w->island->n_pairs) return 1;
     return n < w->settings.max_substeps ? n : w->settings.max_substeps;
+}
+
+/* A frame that ends before its events is said so, unless nobody asked to locate them. */
+static void note_limit(carom_world *w)
+{
+    const int asked = w->settings.integrator != CAROM_FIXED && w->island->n_pairs > 0;
+    if (asked && w->stats->status < CAROM_LIMIT) w->stats->status = CAROM_LIMIT;
 }
 
 static carom_status substep(carom_world *w, double *left)
 {
-    const int last = w->stats->n_substeps + 1 >= substeps_allowed(w);
+    const int last = w->n_substeps + 1 >= substeps_allowed(w);
     begin_substep(w);
     carom_status e = find_contacts(w, *left, last);
     if (e < 0) return e;
+    if (last) note_limit(w);
     const int smooth = w->smooth && !last;
     const int hit = smooth && crm_select_impact(w);
     if (smooth) crm_select_contacts(w, hit);
@@ -80,28 +87,109 @@ static carom_status substep(carom_world *w, double *left)
     return commit(w);
 }
 
-static carom_status advance(carom_world *w)
+static void finish_island(carom_world *w, double left)
+{
+    carom_step_stats *t = w->stats;
+    const crm_substep *s = &w->sub;
+    const int owes = s->end == CRM_END_EVENT || s->end == CRM_END_IMPACT;
+    for (int k = 0; k < w->island->n_bodies; k++) {
+        w->carry[w->island->bodies[k]] = left;
+        w->owes[w->island->bodies[k]] = (unsigned char)owes;
+    }
+    for (int k = 0; k < s->n_contacts; k++) {
+        crm_contact c = s->contacts[k];
+        crm_contact_refresh(w, w->q, &c);
+        t->penetration = fmax(t->penetration, -c.gap);
+    }
+    t->n_contacts += s->n_contacts;
+    if (w->n_substeps > t->n_substeps) t->n_substeps = w->n_substeps;
+}
+
+/* One island through the whole frame. */
+static carom_status advance_island(carom_world *w, const crm_island *island)
 {
     const double dt = w->settings.dt;
-    double left = dt + w->carry;
-    w->carry = 0;
+    double left = dt + w->carry[island->clock];
+    crm_enter(w, island);
+    w->n_substeps = 0;
+    w->first_touch = w->next.n;
     for (int k = 0; left > CARRY_TOL * dt; k++) {
         if (k >= MAX_SUBSTEPS) return CAROM_E_NO_SOLUTION;
         const carom_status e = substep(w, &left);
         if (e < 0) return e;
     }
-    w->carry = left;
+    finish_island(w, left);
     return CAROM_OK;
+}
+
+static carom_status advance_islands(carom_world *w)
+{
+    w->next.n = 0;
+    for (int k = 0; k < w->islands.n; k++) {
+        const carom_status e = advance_island(w, &w->islands.list[k]);
+        if (e < 0) return e;
+    }
+    return CAROM_OK;
+}
+
+/* The static bodies of all states that a sub-step works with. */
+static void place_statics(carom_world *w)
+{
+    if (w->statics_placed) return;
+    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
+    memcpy(w->sub.q0, w->q, bytes);
+    memcpy(w->sub.q1, w->q, bytes);
+    for (int k = 0; k < CRM_MAX_SOLVES; k++) memcpy(w->sub.solve[k].q, w->q, bytes);
+    w->statics_placed = 1;
+}
+
+static void save_state(carom_world *w)
+{
+    const size_t n = (size_t)w->n_bodies;
+    memcpy(w->q_saved, w->q, 3 * n * sizeof(double));
+    memcpy(w->v_saved, w->v, 3 * n * sizeof(double));
+    memcpy(w->carry_saved, w->carry, n * sizeof(double));
+    memcpy(w->owes_saved, w->owes, n);
+}
+
+static void restore_state(carom_world *w)
+{
+    const size_t n = (size_t)w->n_bodies;
+    memcpy(w->q, w->q_saved, 3 * n * sizeof(double));
+    memcpy(w->v, w->v_saved, 3 * n * sizeof(double));
+    memcpy(w->carry, w->carry_saved, n * sizeof(double));
+    memcpy(w->owes, w->owes_saved, n);
+}
+
+/* Bodies that were thrown out of the room foreseen for them may have met others unseen: then the
+ * frame is run again with more room. */
+static carom_status advance(carom_world *w)
+{
+    const carom_step_stats fresh = *w->stats;
+    carom_status e = crm_islands_find(w, w->settings.dt);
+    for (int k = 0; !e; k++) {
+        e = advance_islands(w);
+        if (e < 0 || !w->islands.escaped) break;
+        if (k == MAX_WIDENINGS) {
+            if (w->stats->status < CAROM_LIMIT) w->stats->status = CAROM_LIMIT;
+            break;
+        }
+        const crm_recorder *r = &w->recorder;
+        int changed;
+        e = crm_islands_widen(w, &changed);
+        if (e || !changed) break;
+        restore_state(w);
+        if (r->restart) r->restart(r->user);
+        *w->stats = fresh;
+    }
+    return e;
 }
 
 static void finish_stats(carom_world *w)
 {
     carom_step_stats *t = w->stats;
-    for (int k = 0; k < w->sub.n_contacts; k++) {
-        crm_contact c = w->sub.contacts[k];
-        crm_contact_refresh(w, w->q, &c);
-        t->penetration = fmax(t->penetration, -c.gap);
-    }
+    t->n_islands = w->islands.n;
+    t->n_candidates = w->islands.n_pairs;
     t->joint_drift = crm_joint_drift(w, w->q);
     t->energy = carom_world_energy(w);
 }
@@ -122,19 +210,16 @@ static carom_status step(carom_world *w, const double *force)
     carom_status e = crm_seal(w);
     if (!e) e = take_forces(w, force);
     if (e < 0) return e;
-    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
-    const double carry = w->carry;
-    memcpy(w->q_saved, w->q, bytes);
-    memcpy(w->v_saved, w->v, bytes);
+    place_statics(w);
+    save_state(w);
     e = advance(w);
     if (e < 0) {
-        memcpy(w->q, w->q_saved, bytes);
-        memcpy(w->v, w->v_saved, bytes);
-        w->carry = carry;
-        w->n_guess = 0;
-        return crm_world_fail(w, e, "step %ld, sub-step %d: %s", w->n_steps + 1,
-                              w->stats->n_substeps + 1, carom_status_text(e));
+        restore_state(w);
+        w->touches.n = 0;
+        return crm_world_fail(w, e, "step %ld, sub-step %d: %s", w->n_steps + 1, w->n_substeps + 1,
+                              carom_status_text(e));
     }
+    crm_touches_turn(w);
     w->n_steps++;
     finish_stats(w);
     return w->stats->status;

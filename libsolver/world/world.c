@@ -24,7 +24,7 @@ static carom_status check_settings(const carom_world_settings *s)
     const int bounded = s->dt < HUGE_VAL && s->margin < 1 && s->penetration < 1 &&
                         s->length < HUGE_VAL && s->rest_speed < HUGE_VAL;
     const int finite = isfinite(s->gravity[0]) && isfinite(s->gravity[1]);
-    const int words = s->integrator >= CAROM_EULER && s->integrator <= CAROM_LOCATED &&
+    const int words = s->integrator >= CAROM_EULER && s->integrator <= CAROM_FIXED &&
                       s->combine_friction >= 0 && s->combine_friction <= CAROM_COMBINE_MAX &&
                       s->combine_restitution >= 0 && s->combine_restitution <= CAROM_COMBINE_MAX;
     return positive && bounded && finite && words && s->max_substeps >= 1 ? CAROM_OK
@@ -74,6 +74,7 @@ void crm_free_sealed(carom_world *w)
     crm_free(&w->memory, w->seal_block, w->seal_bytes, 1);
     w->seal_block = NULL;
     crm_rows_free(w);
+    crm_islands_free(w);
     crm_substep_free(w, &w->sub);
 }
 
@@ -84,7 +85,9 @@ void carom_world_destroy(carom_world *world)
     carom_broadphase_destroy(world->broadphase);
     crm_free_sealed(world);
     free_built(world);
-    crm_free(&world->memory, world->guess, (size_t)world->max_guess, sizeof *world->guess);
+    crm_free(&world->memory, world->touches.list, (size_t)world->touches.max,
+             sizeof *world->touches.list);
+    crm_free(&world->memory, world->next.list, (size_t)world->next.max, sizeof *world->next.list);
     crm_memory m = world->memory;
     crm_free(&m, world, 1, sizeof *world);
 }
@@ -153,9 +156,17 @@ carom_status carom_world_set_state(carom_world *world, const double *q, const do
     }
     if (q) memmove(w->q, q, (size_t)n * sizeof *q);
     if (v) memmove(w->v, v, (size_t)n * sizeof *v);
-    w->n_guess = 0;
-    w->carry = 0;
+    w->touches.n = 0;
+    w->statics_placed = 0;
+    crm_forget_clocks(w);
     return CAROM_OK;
+}
+
+void crm_forget_clocks(carom_world *w)
+{
+    if (!w->carry) return;
+    memset(w->carry, 0, (size_t)w->n_bodies * sizeof *w->carry);
+    memset(w->owes, 0, (size_t)w->n_bodies);
 }
 
 double carom_world_energy(const carom_world *world)
@@ -174,23 +185,20 @@ double carom_world_energy(const carom_world *world)
 
 int carom_world_n_contacts(const carom_world *world)
 {
-    return world->sub.n_contacts;
+    return world->touches.n;
 }
 
 carom_contact_info carom_world_contact(const carom_world *world, int k)
 {
-    const crm_substep *s = &world->sub;
-    const crm_contact *c = &s->contacts[k];
-    carom_contact_info i;
-    i.body_a = c->body_a;
-    i.body_b = c->body_b;
-    i.point.x = s->q0[3 * c->body_a + 1] + c->arm_a.x;
-    i.point.y = s->q0[3 * c->body_a + 2] + c->arm_a.y;
-    i.normal = c->normal;
-    i.gap = c->gap;
-    i.ln = s->solve[0].ln[k];
-    i.lt = s->solve[0].lt[k];
-    i.mode = (carom_contact_mode)s->solve[0].mode[k];
+    const crm_touch *t = &world->touches.list[k];
+    const carom_contact_info i = {t->contact.body_a,
+                                  t->contact.body_b,
+                                  t->point,
+                                  t->contact.normal,
+                                  t->contact.gap,
+                                  t->ln,
+                                  t->lt,
+                                  (carom_contact_mode)t->mode};
     return i;
 }
 
@@ -221,9 +229,9 @@ carom_world_size carom_world_measure(const carom_world *world)
     z.n_joints = w->n_joints;
     z.n_unknowns = 3 * (z.n_dynamic + z.n_kinematic);
     z.n_joint_rows = 2 * w->n_joints;
-    z.n_contacts = w->sub.n_contacts;
-    for (int k = 0; k < w->sub.n_contacts; k++) {
-        const crm_contact *c = &w->sub.contacts[k];
+    z.n_contacts = w->touches.n;
+    for (int k = 0; k < w->touches.n; k++) {
+        const crm_contact *c = &w->touches.list[k].contact;
         z.n_friction += crm_combine(w->settings.combine_friction, w->friction[c->body_a],
                                     w->friction[c->body_b]) > 0;
     }

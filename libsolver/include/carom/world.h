@@ -20,7 +20,8 @@ typedef enum carom_body_type {
 
 typedef enum carom_integrator {
     CAROM_EULER,  /* the paper's step, corrected: docs/math/equations.md (1)-(7), (12), (14) */
-    CAROM_LOCATED /* second order; Euler beyond 48 moving bodies: docs/step.md */
+    CAROM_LOCATED, /* second order, impacts are located: docs/step.md */
+    CAROM_FIXED    /* the same without location: one sub-step per step, for piles and real time */
 } carom_integrator;
 
 typedef enum carom_combine {
@@ -34,14 +35,14 @@ typedef enum carom_combine {
  * `--set` use these names (carom_world_settings_set). */
 #define CAROM_WORLD_SETTINGS(X)                                                                    \
     X(dt, double, 1.0 / 60, "s", "length of a step")                                               \
-    X(integrator, int, CAROM_EULER, "", "euler or located")                                        \
+    X(integrator, int, CAROM_EULER, "", "euler, located or fixed")                                        \
     X(combine_friction, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")                \
     X(combine_restitution, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")             \
     X(length, double, 0, "m", "length scale L; 0: largest diameter of a dynamic body's shape")     \
     X(margin, double, 1e-6, "L", "gap below which a pair is in contact")                           \
     X(penetration, double, 1e-9, "L", "overlap below which a new contact needs no shorter step")   \
     X(rest_speed, double, 1e-3, "sqrt(g L)", "approach slower than this does not bounce")          \
-    X(max_substeps, int, 32, "1", "sub-steps of one step, at most; 512/bodies in large worlds")    \
+    X(max_substeps, int, 32, "1", "sub-steps of an island, at most; 512/bodies in large ones")    \
     X(project_overlap, int, 1, "", "overlap of the initial scene: 1 projected away, 0 refused")    \
     X(accept, double, 1e-10, "1", "residual of a solved contact problem")                          \
     X(inexact, double, 1e-6, "1", "residual of a usable one")
@@ -133,9 +134,10 @@ typedef struct carom_step_stats {
     double penetration; /* largest overlap at the end [m], >= 0 */
     double joint_drift; /* largest position error of a joint at the end [m] */
     double energy;      /* kinetic + gravitational at the end [J] */
-    int n_candidates;   /* pairs whose boxes touch */
-    int n_contacts;     /* contact points of the last sub-step */
-    int n_substeps;
+    int n_islands;      /* groups of bodies that advanced alone */
+    int n_candidates;   /* pairs that may touch within the step */
+    int n_contacts;     /* contact points of the islands' last sub-steps */
+    int n_substeps;     /* of the busiest island */
     int n_events; /* impacts: sub-steps in which restitution acted or a step was shortened */
     int factorizations;
     int iterations;
