@@ -141,6 +141,7 @@ typedef struct crm_touch {
     crm_contact contact; /* at the start of the sub-step */
     carom_vec2 point;    /* on A, world [m] */
     double ln, lt;
+    double force_n[2], force_t[2]; /* impulses per time of the first two solves [N] */
     unsigned char mode;
 } crm_touch;
 
@@ -235,6 +236,7 @@ struct carom_world {
     int n_substeps;           /* of the island in this frame */
     crm_touches touches, next;
     int first_touch; /* of the island, in next */
+    double *joint_force[2]; /* per joint row: as crm_touch.force_n [N] */
     long revision;   /* counts changes of parameters */
     long n_steps;
     carom_step_stats *stats; /* of the step under way */
@@ -368,10 +370,12 @@ carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, cons
 void crm_move(const carom_world *w, double *q, const double *v, double scale);
 /* Rounding error of a position difference, from the farthest body [m]. */
 double crm_rounding(const carom_world *w);
-/* Modes of sub.solve[0] from the last accepted sub-step of the island. */
-void crm_guess_load(carom_world *w);
+/* Modes and impulses of the first two solves of sub, of length h, from the last accepted sub-step of
+ * the island. */
+void crm_guess_load(carom_world *w, double h);
 /* Contacts of sub as the island's touches. */
 carom_status crm_touches_save(carom_world *w);
+void crm_forget_guesses(carom_world *w);
 /* The frame is done: next becomes the touches, ordered. */
 void crm_touches_turn(carom_world *w);
 

@@ -85,6 +85,9 @@ static void lay_world(carom_world *w, crm_block *b)
     w->v_saved = crm_carve(b, n3, sizeof(double));
     w->carry = crm_carve(b, (size_t)w->n_bodies, sizeof(double));
     w->carry_saved = crm_carve(b, (size_t)w->n_bodies, sizeof(double));
+    for (int k = 0; k < 2; k++) {
+        w->joint_force[k] = crm_carve(b, 2 * (size_t)w->n_joints, sizeof(double));
+    }
     w->owes = crm_carve(b, (size_t)w->n_bodies, 1);
     w->owes_saved = crm_carve(b, (size_t)w->n_bodies, 1);
     w->joined = crm_carve(b, (size_t)w->n_joints, sizeof *w->joined);

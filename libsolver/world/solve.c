@@ -51,7 +51,10 @@ carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use
     carom_contact_stats stats = {0};
     const carom_contact_problem p = crm_problem(w, s, c);
     carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
-    const carom_status e = carom_contact_solve(w->solver, &p, use_guess, &x, &stats);
+    const int guess = !use_guess                  ? CAROM_GUESS_NONE
+                      : c->kind == CRM_CORRECTION ? CAROM_GUESS_MODES
+                                                  : CAROM_GUESS_IMPULSES;
+    const carom_status e = carom_contact_solve(w->solver, &p, guess, &x, &stats);
     if (e < 0) return e;
     add_stats(w, &stats);
     if (c->kind != CRM_CORRECTION) s->degenerate = stats.degenerate;
@@ -93,22 +96,60 @@ static int find_pair(int n, const crm_touch *t, const crm_contact *c)
     return low;
 }
 
-void crm_guess_load(carom_world *w)
+/* What is known of contact c: its touch, or NULL. */
+static const crm_touch *recall(const carom_world *w, const crm_contact *c)
 {
-    crm_substep *s = &w->sub;
     const int again = w->n_substeps > 0;
     const crm_touch *t = again ? w->next.list + w->first_touch : w->touches.list;
     const int n = again ? w->next.n - w->first_touch : w->touches.n;
+    for (int i = find_pair(n, t, c); i < n && t[i].contact.shape_a == c->shape_a &&
+                                     t[i].contact.shape_b == c->shape_b;
+         i++) {
+        if (crm_recipe_same(t[i].contact.recipe, c->recipe)) return &t[i];
+    }
+    return NULL;
+}
+
+void crm_guess_load(carom_world *w, double h)
+{
+    static const crm_touch none = {0};
+    crm_substep *s = &w->sub;
     for (int k = 0; k < s->n_contacts; k++) {
         const crm_contact *c = &s->contacts[k];
-        unsigned char *mode = &s->solve[0].mode[k];
-        *mode = c->speculative ? CAROM_SEPARATED : CAROM_STICK;
-        for (int i = find_pair(n, t, c); i < n && t[i].contact.shape_a == c->shape_a &&
-                                         t[i].contact.shape_b == c->shape_b;
-             i++) {
-            if (crm_recipe_same(t[i].contact.recipe, c->recipe)) *mode = t[i].mode;
+        const crm_touch *known = recall(w, c);
+        const crm_touch *t = known ? known : &none;
+        const int fresh = c->speculative ? CAROM_SEPARATED : CAROM_STICK;
+        s->solve[0].mode[k] = (unsigned char)(known ? known->mode : fresh);
+        for (int i = 0; i < 2; i++) {
+            s->solve[i].ln[k] = h * t->force_n[i];
+            s->solve[i].lt[k] = h * t->force_t[i];
         }
     }
+    for (int k = 0; k < 2 * w->island->n_joints; k++) {
+        const int row = 2 * w->island->joints[k / 2] + k % 2;
+        for (int i = 0; i < 2; i++) s->solve[i].le[k] = h * w->joint_force[i][row];
+    }
+}
+
+/* Impulses per time of solve i of sub; an impact has none. */
+static double per_time(const crm_substep *s, int i)
+{
+    const crm_solve_kind kind = s->solve[i].kind;
+    return s->h > 0 && i < s->n_solves && kind != CRM_CORRECTION ? 1 / s->h : 0;
+}
+
+static crm_touch touch_of(const crm_substep *s, int k)
+{
+    const crm_contact *c = &s->contacts[k];
+    crm_touch t = {*c, {0, 0}, s->solve[0].ln[k], s->solve[0].lt[k], {0, 0}, {0, 0},
+                   s->solve[0].mode[k]};
+    t.point.x = s->q0[3 * c->body_a + 1] + c->arm_a.x;
+    t.point.y = s->q0[3 * c->body_a + 2] + c->arm_a.y;
+    for (int i = 0; i < 2; i++) {
+        t.force_n[i] = per_time(s, i) * s->solve[i].ln[k];
+        t.force_t[i] = per_time(s, i) * s->solve[i].lt[k];
+    }
+    return t;
 }
 
 carom_status crm_touches_save(carom_world *w)
@@ -120,15 +161,20 @@ carom_status crm_touches_save(carom_world *w)
         crm_reserve(&w->memory, &p, &t->max, w->first_touch + s->n_contacts, sizeof *t->list);
     t->list = p;
     if (e) return e;
-    t->n = w->first_touch;
-    for (int k = 0; k < s->n_contacts; k++) {
-        const crm_contact *c = &s->contacts[k];
-        const carom_vec2 point = {s->q0[3 * c->body_a + 1] + c->arm_a.x,
-                                  s->q0[3 * c->body_a + 2] + c->arm_a.y};
-        const crm_touch x = {*c, point, s->solve[0].ln[k], s->solve[0].lt[k], s->solve[0].mode[k]};
-        t->list[t->n++] = x;
+    t->n = w->first_touch + s->n_contacts;
+    for (int k = 0; k < s->n_contacts; k++) t->list[w->first_touch + k] = touch_of(s, k);
+    for (int k = 0; k < 2 * w->island->n_joints; k++) {
+        const int row = 2 * w->island->joints[k / 2] + k % 2;
+        for (int i = 0; i < 2; i++) w->joint_force[i][row] = per_time(s, i) * s->solve[i].le[k];
     }
     return CAROM_OK;
+}
+
+void crm_forget_guesses(carom_world *w)
+{
+    const size_t bytes = 2 * (size_t)w->n_joints * sizeof(double);
+    w->touches.n = 0;
+    for (int i = 0; i < 2 && w->joint_force[i]; i++) memset(w->joint_force[i], 0, bytes);
 }
 
 /* By shape pair; contacts of one pair keep their order, for they are next to each other. */

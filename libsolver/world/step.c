@@ -79,7 +79,7 @@ static carom_status substep(carom_world *w, double *left)
     const int smooth = w->smooth && !last;
     const int hit = smooth && crm_select_impact(w);
     if (smooth) crm_select_contacts(w, hit);
-    crm_guess_load(w);
+    crm_guess_load(w, *left);
     e = hit ? crm_impact(w) : last ? crm_run_through(w, *left) : crm_locate(w, *left);
     if (e < 0) return e;
     if (e > w->stats->status) w->stats->status = e;
@@ -215,7 +215,7 @@ static carom_status step(carom_world *w, const double *force)
     e = advance(w);
     if (e < 0) {
         restore_state(w);
-        w->touches.n = 0;
+        crm_forget_guesses(w);
         return crm_world_fail(w, e, "step %ld, sub-step %d: %s", w->n_steps + 1, w->n_substeps + 1,
                               carom_status_text(e));
     }

@@ -71,6 +71,8 @@ static void free_built(carom_world *w)
 
 void crm_free_sealed(carom_world *w)
 {
+    w->joint_force[0] = w->joint_force[1] = NULL;
+    w->carry = NULL;
     crm_free(&w->memory, w->seal_block, w->seal_bytes, 1);
     w->seal_block = NULL;
     crm_rows_free(w);
@@ -156,7 +158,7 @@ carom_status carom_world_set_state(carom_world *world, const double *q, const do
     }
     if (q) memmove(w->q, q, (size_t)n * sizeof *q);
     if (v) memmove(w->v, v, (size_t)n * sizeof *v);
-    w->touches.n = 0;
+    crm_forget_guesses(w);
     w->statics_placed = 0;
     crm_forget_clocks(w);
     return CAROM_OK;
