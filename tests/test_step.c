@@ -374,8 +374,9 @@ static void no_tunnel(void **state)
     carom_world_destroy(w);
 }
 
-/* Twelve discs fall into a heap: certified, nothing overlaps at the end of a step, and no step adds
- * energy: falling freely the Euler map loses m (g h)^2 / 2, and contacts only take. */
+/* Twelve discs fall into a heap: certified, and nothing overlaps at the end of a step.  Contacts only
+ * take energy, but the sub-step after an impact holds its rebound e u against gravity: m g h e u too
+ * much, with u <= g h where a disc bounces again and again. */
 static void many_discs_settle(void **state)
 {
     (void)state;
@@ -390,7 +391,7 @@ static void many_discs_settle(void **state)
         scene_run(w, 1, &s);
         assert_at_most("residual", s.residual, 1e-6);
         assert_at_most("penetration", s.penetration, 1e-6);
-        assert_true(carom_world_energy(w) <= energy + 1e-6);
+        assert_true(carom_world_energy(w) <= energy + 0.3 * 3 * pow(9.81 / 60, 2));
         energy = carom_world_energy(w);
     }
     carom_world_destroy(w);

@@ -26,9 +26,9 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     const size_t k3 = 3 * (size_t)r->world->n_moving;
     const size_t rows = 2 * (size_t)r->world->n_joints;
     crm_substep *s = &r->work;
-    double **const full[] = {&r->q_bar,    &r->v_bar,   &r->q_seed,  &r->v_seed, &r->q_event,
-                             &r->solve_bar, &r->pose,    &r->pose_bar, &r->q_after, &r->v_after,
-                             &s->q0,        &s->v0,      &s->q1,       &s->v1};
+    double **const full[] = {&r->q_bar,     &r->v_bar, &r->q_seed,   &r->v_seed,  &r->q_event,
+                             &r->solve_bar, &r->pose,  &r->pose_bar, &r->q_after, &r->v_after,
+                             &s->q0,        &s->v0,    &s->q1,       &s->v1};
     for (size_t k = 0; k < sizeof full / sizeof *full; k++) {
         *full[k] = crm_carve(b, n3, sizeof(double));
     }

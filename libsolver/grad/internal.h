@@ -58,7 +58,7 @@ typedef struct crm_reverse {
     crm_contact *moved; /* contacts at the pose of the problem under way */
     crm_substep work;   /* the sub-step under way, states of world size */
     double *solve_q[CRM_MAX_SOLVES], *solve_v[CRM_MAX_SOLVES]; /* its arrays */
-    double *q_after, *v_after;     /* 3 n_bodies: state after it */
+    double *q_after, *v_after;                                 /* 3 n_bodies: state after it */
     double *clock_bar, *clock_old; /* per body: cotangent of the time owed to the next step, of the
                                     * frame under way and of the one after it */
     void *block;

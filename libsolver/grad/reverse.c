@@ -132,8 +132,8 @@ void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, cons
         if (with_parameters && rough) add_friction(r, &s->moved[k], r->bars.mu[k]);
     }
     for (int k = 0; k < r->world->island->n_joints; k++) {
-        crm_joint_vjp(r, c->q, r->world->island->joints[k], &r->bars.je[12 * k], error_bar ? &error_bar[2 * k] : NULL, q_bar,
-                      with_parameters);
+        crm_joint_vjp(r, c->q, r->world->island->joints[k], &r->bars.je[12 * k],
+                      error_bar ? &error_bar[2 * k] : NULL, q_bar, with_parameters);
     }
 }
 

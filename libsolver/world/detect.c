@@ -4,8 +4,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Circles around shapes are larger than they need to be, for rounding and for shapes that derivative
- * checks have changed a little. */
+/* Circles around shapes are larger than they need to be, for rounding and for shapes that
+ * derivative checks have changed a little. */
 static const double CUSHION = 1.01;
 
 static long body_key(const carom_world *w, int a, int b)

@@ -62,7 +62,8 @@ static double violation(const carom_world *w, const crm_substep *s)
         const double gap = s->moved[k].gap;
         largest = fmax(largest, s->pressing[k] ? fabs(gap) : -gap);
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++) largest = fmax(largest, fabs(w->rows.error[k]));
+    for (int k = 0; k < 2 * w->island->n_joints; k++)
+        largest = fmax(largest, fabs(w->rows.error[k]));
     return largest;
 }
 

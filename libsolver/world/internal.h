@@ -226,18 +226,18 @@ struct carom_world {
     crm_rows rows;
     crm_substep sub;
     double *q_saved, *v_saved; /* 3 n_bodies: for a failed step */
-    double *carry;       /* per body: time owed to the next step, 0 but for rounding and derivative */
+    double *carry; /* per body: time owed to the next step, 0 but for rounding and derivative */
     unsigned char *owes; /* per body: the last step ended with an event */
     double *carry_saved;
     unsigned char *owes_saved;
-    int statics_placed;  /* 1: the states of sub hold the static bodies */
-    crm_islands islands; /* of the frame under way */
+    int statics_placed;       /* 1: the states of sub hold the static bodies */
+    crm_islands islands;      /* of the frame under way */
     const crm_island *island; /* under way */
     int n_substeps;           /* of the island in this frame */
     crm_touches touches, next;
-    int first_touch; /* of the island, in next */
+    int first_touch;        /* of the island, in next */
     double *joint_force[2]; /* per joint row: as crm_touch.force_n [N] */
-    long revision;   /* counts changes of parameters */
+    long revision;          /* counts changes of parameters */
     long n_steps;
     carom_step_stats *stats; /* of the step under way */
     crm_recorder recorder;
@@ -370,8 +370,8 @@ carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, cons
 void crm_move(const carom_world *w, double *q, const double *v, double scale);
 /* Rounding error of a position difference, from the farthest body [m]. */
 double crm_rounding(const carom_world *w);
-/* Modes and impulses of the first two solves of sub, of length h, from the last accepted sub-step of
- * the island. */
+/* Modes and impulses of the first two solves of sub, of length h, from the last accepted sub-step
+ * of the island. */
 void crm_guess_load(carom_world *w, double h);
 /* Contacts of sub as the island's touches. */
 carom_status crm_touches_save(carom_world *w);
@@ -413,8 +413,8 @@ double crm_slip(const carom_world *w, const crm_contact *c, const double *q0, co
 /* locate.c: S(left), or S of a fraction of it when that has no solution. */
 carom_status crm_run_through(carom_world *w, double left);
 /* Runs S on (0, left]; when a contact outside sub.contacts closes on the way, ends at the
- * first such event. */
-carom_status crm_locate(carom_world *w, double left);
+ * first such event; when more than `allowed` do, *busy = 1 and nothing counts. */
+carom_status crm_locate(carom_world *w, double left, int allowed, int *busy);
 
 /* seal.c */
 carom_status crm_seal(carom_world *w);

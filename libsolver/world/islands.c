@@ -111,7 +111,8 @@ static carom_status find_pairs(carom_world *w, int *same)
     *same = 1;
     for (int k = 0; k < n; k++) {
         if (!crm_may_collide(w, pairs[k])) continue;
-        if (m >= s->n_pairs || s->found[m].a != pairs[k].a || s->found[m].b != pairs[k].b) *same = 0;
+        if (m >= s->n_pairs || s->found[m].a != pairs[k].a || s->found[m].b != pairs[k].b)
+            *same = 0;
         s->found[m++] = pairs[k];
     }
     if (m != s->n_pairs) *same = 0;

@@ -82,7 +82,7 @@ typedef struct search {
     carom_world *w;
     double tol; /* overlap that counts [m] */
     double hit; /* gap that touches [m] */
-    int any;
+    int any;    /* how many */
     watch best;
 } search;
 
@@ -95,7 +95,7 @@ static void consider(search *f, const watch *x)
     watch_start(f->w, &y);
     if (!(y.g0 > 0) || (y.touches && y.opened)) return;
     if (!f->any || earlier(&y, &f->best)) f->best = y;
-    f->any = 1;
+    f->any++;
 }
 
 /* First contact of sub with this pair, or -1; contacts and pairs run in the same order. */
@@ -295,8 +295,9 @@ carom_status crm_run_through(carom_world *w, double left)
     return e == CAROM_E_NO_SOLUTION || e == CAROM_E_INFEASIBLE ? halve(w, left, e) : e;
 }
 
-carom_status crm_locate(carom_world *w, double left)
+carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
 {
+    *busy = 0;
     crm_substep *s = &w->sub;
     carom_status e = crm_run_through(w, left);
     if (e < 0 || s->end != CRM_END_FRAME) return e;
@@ -304,6 +305,10 @@ carom_status crm_locate(carom_world *w, double left)
     int any;
     first_closed(w, &x, &any);
     if (!any) return e;
+    if (any > allowed) {
+        *busy = 1;
+        return CAROM_OK;
+    }
     if (x.touches) {
         set_event(w, &x);
         return CAROM_OK;

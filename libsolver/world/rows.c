@@ -196,7 +196,9 @@ carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const cr
     crm_rows_at(w, s, c->q);
     switch (c->kind) {
     case CRM_VELOCITY: crm_free_velocity(w, s, s->v0, s->h); break;
-    case CRM_CORRECTION: memset(w->rows.u, 0, 3 * (size_t)w->island->n_bodies * sizeof(double)); break;
+    case CRM_CORRECTION:
+        memset(w->rows.u, 0, 3 * (size_t)w->island->n_bodies * sizeof(double));
+        break;
     case CRM_IMPACT: crm_free_velocity(w, s, s->v0, 0); break;
     case CRM_STAGE_1: crm_free_velocity(w, s, s->v0, 0.5 * s->h); break;
     case CRM_STAGE_2: crm_free_velocity(w, s, c[-1].v, 0.5 * s->h); break;

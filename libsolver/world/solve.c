@@ -102,9 +102,8 @@ static const crm_touch *recall(const carom_world *w, const crm_contact *c)
     const int again = w->n_substeps > 0;
     const crm_touch *t = again ? w->next.list + w->first_touch : w->touches.list;
     const int n = again ? w->next.n - w->first_touch : w->touches.n;
-    for (int i = find_pair(n, t, c); i < n && t[i].contact.shape_a == c->shape_a &&
-                                     t[i].contact.shape_b == c->shape_b;
-         i++) {
+    for (int i = find_pair(n, t, c);
+         i < n && t[i].contact.shape_a == c->shape_a && t[i].contact.shape_b == c->shape_b; i++) {
         if (crm_recipe_same(t[i].contact.recipe, c->recipe)) return &t[i];
     }
     return NULL;
@@ -141,8 +140,8 @@ static double per_time(const crm_substep *s, int i)
 static crm_touch touch_of(const crm_substep *s, int k)
 {
     const crm_contact *c = &s->contacts[k];
-    crm_touch t = {*c, {0, 0}, s->solve[0].ln[k], s->solve[0].lt[k], {0, 0}, {0, 0},
-                   s->solve[0].mode[k]};
+    crm_touch t = {*c,     {0, 0}, s->solve[0].ln[k],  s->solve[0].lt[k],
+                   {0, 0}, {0, 0}, s->solve[0].mode[k]};
     t.point.x = s->q0[3 * c->body_a + 1] + c->arm_a.x;
     t.point.y = s->q0[3 * c->body_a + 2] + c->arm_a.y;
     for (int i = 0; i < 2; i++) {
@@ -152,14 +151,21 @@ static crm_touch touch_of(const crm_substep *s, int k)
     return t;
 }
 
+static carom_status reserve_touches(carom_world *w, crm_touches *t, int n)
+{
+    void *p = t->list;
+    const carom_status e = crm_reserve(&w->memory, &p, &t->max, n, sizeof *t->list);
+    t->list = p;
+    return e;
+}
+
 carom_status crm_touches_save(carom_world *w)
 {
     const crm_substep *s = &w->sub;
     crm_touches *t = &w->next;
-    void *p = t->list;
-    const carom_status e =
-        crm_reserve(&w->memory, &p, &t->max, w->first_touch + s->n_contacts, sizeof *t->list);
-    t->list = p;
+    /* Both lists, for they take turns. */
+    carom_status e = reserve_touches(w, t, w->first_touch + s->n_contacts);
+    if (!e) e = reserve_touches(w, &w->touches, w->first_touch + s->n_contacts);
     if (e) return e;
     t->n = w->first_touch + s->n_contacts;
     for (int k = 0; k < s->n_contacts; k++) t->list[w->first_touch + k] = touch_of(s, k);

@@ -6,7 +6,7 @@
 /* Time below this fraction of a step is carried into the next one. */
 static const double CARRY_TOL = 1e-13;
 /* Moving bodies times sub-steps of one frame, and sub-steps beyond all counting. */
-enum { BODY_SUBSTEPS = 512, MAX_SUBSTEPS = 256 };
+enum { BODY_SUBSTEPS = 256, MAX_SUBSTEPS = 256 };
 /* How often pairs are looked for again when bodies leave the room foreseen for them. */
 enum { MAX_WIDENINGS = 4 };
 
@@ -62,25 +62,45 @@ static int substeps_allowed(const carom_world *w)
     return n < w->settings.max_substeps ? n : w->settings.max_substeps;
 }
 
-/* A frame that ends before its events is said so, unless nobody asked to locate them. */
-static void note_limit(carom_world *w)
+/* Whether a contact that was ahead closed: an event that nobody located. */
+static int met_ahead(const crm_substep *s)
 {
-    const int asked = w->settings.integrator != CAROM_FIXED && w->island->n_pairs > 0;
-    if (asked && w->stats->status < CAROM_LIMIT) w->stats->status = CAROM_LIMIT;
+    for (int k = 0; k < s->n_contacts; k++) {
+        if (s->contacts[k].speculative && s->solve[0].mode[k] != CAROM_SEPARATED) return 1;
+    }
+    return 0;
+}
+
+/* The rest of the frame as one sub-step; events in it are said, unless nobody asked for them. */
+static carom_status run_last(carom_world *w, double left)
+{
+    carom_status e = find_contacts(w, left, 1);
+    if (e < 0) return e;
+    crm_guess_load(w, left);
+    e = crm_run_through(w, left);
+    const int asked = w->settings.integrator != CAROM_FIXED;
+    return e >= 0 && e < CAROM_LIMIT && asked && met_ahead(&w->sub) ? CAROM_LIMIT : e;
+}
+
+/* Up to the next event; *busy: there are more of them than sub-steps allowed. */
+static carom_status run_located(carom_world *w, double left, int allowed, int *busy)
+{
+    carom_status e = find_contacts(w, left, 0);
+    if (e < 0) return e;
+    const int hit = w->smooth && crm_select_impact(w);
+    if (w->smooth) crm_select_contacts(w, hit);
+    crm_guess_load(w, left);
+    *busy = 0;
+    return hit ? crm_impact(w) : crm_locate(w, left, allowed, busy);
 }
 
 static carom_status substep(carom_world *w, double *left)
 {
-    const int last = w->n_substeps + 1 >= substeps_allowed(w);
+    const int allowed = substeps_allowed(w) - w->n_substeps - 1;
+    int busy = allowed <= 0;
     begin_substep(w);
-    carom_status e = find_contacts(w, *left, last);
-    if (e < 0) return e;
-    if (last) note_limit(w);
-    const int smooth = w->smooth && !last;
-    const int hit = smooth && crm_select_impact(w);
-    if (smooth) crm_select_contacts(w, hit);
-    crm_guess_load(w, *left);
-    e = hit ? crm_impact(w) : last ? crm_run_through(w, *left) : crm_locate(w, *left);
+    carom_status e = busy ? CAROM_OK : run_located(w, *left, allowed, &busy);
+    if (e >= 0 && busy) e = run_last(w, *left);
     if (e < 0) return e;
     if (e > w->stats->status) w->stats->status = e;
     *left = w->sub.end == CRM_END_FRAME ? 0 : *left - w->sub.h;
