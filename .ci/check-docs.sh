@@ -20,10 +20,14 @@ block_after() {
         index($0, name) { seen = 1 }' README.md
 }
 
-for example in clients/examples/embed.c clients/examples/client.py; do
+for example in clients/examples/*.c clients/examples/*.py; do
     block_after "$example" >"$work/block"
     [ -s "$work/block" ] || error "README.md does not show $example"
     diff "$example" "$work/block" || error "README.md shows another $example"
+done
+for example in embed.c lcm_client.c client.py; do
+    lines=$(wc -l <"clients/examples/$example")
+    [ "$lines" -le 20 ] || error "clients/examples/$example has $lines lines, more than 20"
 done
 
 for page in $(find . -name '*.md' -not -path './build*' -not -path './out/*' | sort); do

@@ -9,6 +9,7 @@ set(CAROM_EXTERNAL
   "SuiteSparse::AMD|CaromSuiteSparse:AMD|-lamd -lsuitesparseconfig|AMD_LIBRARY"
   "SuiteSparse::KLU|CaromSuiteSparse:KLU|-lklu -lbtf -lcolamd -lamd -lsuitesparseconfig|KLU_LIBRARY"
   "LCM::lcm|LCM|-llcm|LCM_LIBRARY"
+  "Jansson::jansson|Jansson|-ljansson|JANSSON_LIBRARY"
   "Threads::Threads|Threads|-pthread|"
   "m||-lm|")
 
@@ -131,4 +132,4 @@ install(EXPORT carom-targets NAMESPACE carom:: DESTINATION ${CAROM_CMAKE_DIR})
 install(FILES ${PROJECT_BINARY_DIR}/carom-config.cmake
   ${PROJECT_BINARY_DIR}/carom-config-version.cmake DESTINATION ${CAROM_CMAKE_DIR})
 install(FILES cmake/FindCaromSuiteSparse.cmake cmake/FindLibccd.cmake cmake/FindLCM.cmake
-  DESTINATION ${CAROM_CMAKE_DIR}/modules)
+  cmake/FindJansson.cmake DESTINATION ${CAROM_CMAKE_DIR}/modules)

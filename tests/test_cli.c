@@ -59,7 +59,7 @@ static void run_prints_exact_numbers(void **state)
     (void)state;
     char name[256];
     snprintf(name, sizeof name, "%s/scenes/e_cradle.json", TEST_DATA);
-    crm_problems problems = {name, 0, NULL};
+    crm_problems problems = crm_problems_of(name);
     crm_scene *scene = crm_scene_read(&problems);
     assert_non_null(scene);
     carom_world *w = NULL;

@@ -24,9 +24,7 @@ static crm_scene *read_text(const char *text, crm_problems *problems)
     assert_non_null(f);
     fputs(text, f);
     fclose(f);
-    problems->file = name;
-    problems->count = 0;
-    problems->text = NULL;
+    *problems = crm_problems_of(name);
     crm_scene *scene = crm_scene_read(problems);
     remove(name);
     return scene;
@@ -53,7 +51,7 @@ static void scenes_of_the_data_are_read(void **state)
     for (size_t k = 0; k < sizeof SCENES / sizeof SCENES[0]; k++) {
         char name[256];
         snprintf(name, sizeof name, "%s/scenes/%s.json", TEST_DATA, SCENES[k]);
-        crm_problems problems = {name, 0, NULL};
+        crm_problems problems = crm_problems_of(name);
         crm_scene *scene = crm_scene_read(&problems);
         expect_valid(scene, &problems);
         assert_string_equal(scene->name, SCENES[k]);
@@ -244,7 +242,7 @@ static void ignored_keys(void **state)
 static void missing_file(void **state)
 {
     (void)state;
-    crm_problems problems = {"/nonexistent/scene.json", 0, NULL};
+    crm_problems problems = crm_problems_of("/nonexistent/scene.json");
     assert_null(crm_scene_read(&problems));
     assert_int_equal(problems.count, 1);
     assert_non_null(strstr(problems.text[0], "/nonexistent/scene.json: cannot be read"));

@@ -2,6 +2,7 @@
 #include "clients/c/scene/scene.h"
 #include "cmd.h"
 #include "io/load.h"
+#include "io/memory.h"
 #include "io/output.h"
 
 #include <math.h>
@@ -121,11 +122,11 @@ static int write_pairs(const crm_arguments *a, const pair *pairs, int count)
 
 static int run(const crm_arguments *a)
 {
-    crm_problems problems = {a->files[0], 0, NULL};
+    crm_problems problems = crm_problems_of(a->files[0]);
     json_t *json = crm_json_load(&problems);
     int count = 0;
     pair *pairs = json ? read_pairs(&problems, json, &count) : NULL;
-    const int code = problems.count ? CRM_USAGE : write_pairs(a, pairs, count);
+    const int code = crm_faulty(&problems) ? CRM_USAGE : write_pairs(a, pairs, count);
     crm_print_problems(&problems);
     for (int i = 0; i < count; i++) {
         crm_shape_free(&pairs[i].a);

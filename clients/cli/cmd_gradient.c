@@ -216,7 +216,7 @@ static int check_and_write(const crm_arguments *a, const crm_run *run, const crm
 
 static int differentiate(const crm_arguments *a, const crm_run *run)
 {
-    crm_problems problems = {crm_argument(a, "--loss"), 0, NULL};
+    crm_problems problems = crm_problems_of(crm_argument(a, "--loss"));
     if (!problems.file) return crm_usage_error(a->command, "needs --loss LOSS");
     crm_loss loss;
     crm_gradient g;

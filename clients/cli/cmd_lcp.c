@@ -72,7 +72,7 @@ static int solve_problem(const crm_lcp *lcp, carom_contact_solver *solver, const
 
 static int solve_file(const char *file, carom_contact_solver *solver, crm_output *out)
 {
-    crm_problems problems = {file, 0, NULL};
+    crm_problems problems = crm_problems_of(file);
     crm_lcp lcp;
     int code = CRM_USAGE;
     if (crm_lcp_read(&problems, &lcp)) code = solve_problem(&lcp, solver, file, out);

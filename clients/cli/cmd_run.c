@@ -1,5 +1,6 @@
 #include "cmd.h"
 #include "io/load.h"
+#include "io/memory.h"
 #include "io/output.h"
 #include "io/progress.h"
 #include "io/trajectory.h"

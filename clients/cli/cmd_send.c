@@ -1,6 +1,7 @@
 #include "clients/c/scene/remote.h"
 #include "cmd.h"
 #include "io/load.h"
+#include "io/memory.h"
 #include "io/output.h"
 #include "io/progress.h"
 #include "io/trajectory.h"
@@ -29,24 +30,13 @@ static void on_state(void *user, const carom_client_state *state)
     s->written = k;
 }
 
-/* Forces of the tables in `count` steps from `start` on; *n of them. */
-static carom_client_force *table_forces(const crm_scene *scene, long start, int count, int *n)
+/* Where a run ends early, its last state is no sample. */
+static void put_last(sending *s, const carom_client_state *state)
 {
-    carom_client_force *list = NULL;
-    double *force = crm_resize(NULL, 3 * (size_t)scene->n_bodies, sizeof *force);
-    const double dt = scene->settings.dt;
-    *n = 0;
-    for (int k = 0; k < count && crm_scene_force(scene, (double)(start + k) * dt, dt, force); k++) {
-        for (int i = 0; i < scene->n_bodies; i++) {
-            if (!scene->bodies[i].n_rows) continue;
-            list = crm_resize(list, (size_t)*n + 1, sizeof *list);
-            list[*n].step = k;
-            list[*n].body = i;
-            memcpy(list[(*n)++].force, &force[3 * i], 3 * sizeof(double));
-        }
-    }
-    free(force);
-    return list;
+    const long k = state ? (long)state->step : -1;
+    if (k <= s->written) return;
+    crm_put_state(s->out, k, state->time, state->n_bodies, state->q, state->v);
+    s->written = k;
 }
 
 /* One request of `count` steps (0: only the present state). */
@@ -54,7 +44,10 @@ static carom_client_code send_steps(carom_client *client, sending *s, long start
 {
     carom_client_run request;
     memset(&request, 0, sizeof request);
-    carom_client_force *forces = table_forces(s->run->scene, start, count, &request.n_forces);
+    carom_client_force *forces = NULL;
+    if (!crm_scene_forces(s->run->scene, start, count, &forces, &request.n_forces)) {
+        crm_no_memory();
+    }
     request.n_steps = count;
     request.publish_every = 1; /* the summary counts every step */
     request.forces = forces;
@@ -97,7 +90,8 @@ static int report_end(const crm_run *run, const carom_client *client, carom_clie
 static int send_scene(const crm_arguments *a, const crm_run *run, carom_client *client)
 {
     crm_output out;
-    carom_client_scene scene = crm_scene_client(run->scene);
+    carom_client_scene scene;
+    if (!crm_scene_client(run->scene, &scene)) crm_no_memory();
     carom_client_code code = carom_client_open(client, &scene);
     crm_scene_client_free(&scene);
     if (code < 0) return report_end(run, client, code, 0);
@@ -111,6 +105,7 @@ static int send_scene(const crm_arguments *a, const crm_run *run, carom_client *
     crm_catch_interrupts();
     crm_put_header(&out, crm_run_name(run), run->scene->n_bodies, run->scene->settings.dt);
     code = send_all(client, &s, crm_argument_given(a, "--quiet"));
+    put_last(&s, carom_client_get_state(client));
     crm_put_summary(&out, &s.summary);
     int result = report_end(run, client, code, s.summary.steps);
     if (!crm_output_close(&out)) result = CRM_FAILED;

@@ -22,18 +22,18 @@ static void check_world(crm_problems *problems, const crm_scene *scene)
 
 static int validate_file(const char *file)
 {
-    crm_problems problems = {file, 0, NULL};
+    crm_problems problems = crm_problems_of(file);
     crm_scene *scene = crm_scene_read(&problems);
     if (scene) check_world(&problems, scene);
     crm_print_problems(&problems);
-    if (problems.count || !scene) {
+    if (crm_faulty(&problems)) {
         fprintf(stderr, "%s: %d %s\n", problems.file, problems.count,
                 problems.count == 1 ? "error" : "errors");
     } else {
         printf("%s: valid, %d bodies, %d joints\n", problems.file, scene->n_bodies,
                scene->n_joints);
     }
-    const int code = problems.count || !scene ? CRM_USAGE : CRM_DONE;
+    const int code = crm_faulty(&problems) ? CRM_USAGE : CRM_DONE;
     crm_scene_free(scene);
     crm_problems_free(&problems);
     return code;

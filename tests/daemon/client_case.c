@@ -2,8 +2,10 @@
 
 #include "near.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 carom_client_scene case_scene(void)
 {
@@ -193,6 +195,78 @@ void case_session(carom_client *client)
     succeeds(client, carom_client_step(client, &run));
     succeeds(client, carom_client_close(client));
     assert_int_equal(carom_client_step(client, &run), CAROM_CLIENT_E_SESSION);
+}
+
+/* Opens the text as a scene file. */
+static carom_client_code open_text(carom_client *client, const char *text)
+{
+    char name[64];
+    snprintf(name, sizeof name, "/tmp/carom_test_file_%ld.json", (long)getpid());
+    FILE *f = fopen(name, "w");
+    assert_non_null(f);
+    fputs(text, f);
+    fclose(f);
+    const carom_client_code code = carom_client_open_file(client, name);
+    remove(name);
+    return code;
+}
+
+/* One body of 2 kg, pushed by 4 N along x for 0.05 s by the table of its file, and by 2 N along y
+ * in the first step by the caller. */
+void case_file(carom_client *client)
+{
+    static const char *const head = "{\"format\":\"carom-scene/1\",\"gravity\":[0,0],\"dt\":0.01,"
+                                    "\"bodies\":[{\"mass\":2,\"inertia\":1,";
+    const carom_client_force push = {0, 0, {0, 0, 2}};
+    char text[512];
+    carom_client_run run;
+    memset(&run, 0, sizeof run);
+    run.n_steps = 10;
+    run.n_forces = 1;
+    run.forces = &push;
+    snprintf(text, sizeof text, "%s\"forces\":[[0,0,4,0],[0.05,0,0,0]]}]}", head);
+    succeeds(client, open_text(client, text));
+    assert_null(carom_client_get_state(client));
+    succeeds(client, carom_client_step(client, &run));
+    const carom_client_state *s = carom_client_get_state(client);
+    assert_non_null(s);
+    assert_int_equal(s->step, 10);
+    assert_int_equal(s->n_bodies, 1);
+    assert_near(s->time, 0.1, 1e-15);
+    assert_near(s->v[1], 4 * 0.05 / 2, 1e-15); /* ten roundings below 1 */
+    assert_near(s->v[2], 2 * 0.01 / 2, 1e-15);
+    run.n_forces = 0;
+    succeeds(client, carom_client_step(client, &run)); /* the table is over */
+    assert_near(carom_client_get_state(client)->v[1], 0.1, 1e-15);
+    succeeds(client, carom_client_reset(client));
+    succeeds(client, carom_client_step(client, &run)); /* and starts again with the session */
+    assert_near(carom_client_get_state(client)->v[1], 0.1, 1e-15);
+    assert_near(carom_client_get_state(client)->v[2], 0, 0);
+
+    const carom_client_scene other = case_scene();
+    succeeds(client, carom_client_open(client, &other));
+    assert_null(carom_client_get_state(client));
+    run.contacts = 1;
+    run.n_steps = CASE_STEPS;
+    succeeds(client, carom_client_step(client, &run)); /* the table is gone: the plain trajectory */
+    double direct[CASE_STEPS][3 * CASE_BODIES];
+    case_direct(direct);
+    s = carom_client_get_state(client);
+    assert_memory_equal(s->q, direct[CASE_STEPS - 1], sizeof direct[0]);
+    assert_true(s->n_contacts > 0 && s->contacts[0].body_b < CASE_BODIES);
+
+    snprintf(text, sizeof text, "%s\"mas\":1,\"friction\":-1}]}", head);
+    assert_int_equal(open_text(client, text), CAROM_CLIENT_E_ARGUMENT);
+    assert_non_null(strstr(carom_client_error(client), "bodies[0].mas: unknown key"));
+    assert_non_null(strstr(carom_client_error(client), "(and 1 more)"));
+    assert_int_equal(open_text(client, "{"), CAROM_CLIENT_E_ARGUMENT);
+    assert_non_null(strstr(carom_client_error(client), "line 1"));
+    assert_int_equal(carom_client_open_file(client, "/no/such/file"), CAROM_CLIENT_E_ARGUMENT);
+    assert_non_null(strstr(carom_client_error(client), "/no/such/file: cannot be read"));
+    assert_int_equal(carom_client_open_file(client, NULL), CAROM_CLIENT_E_ARGUMENT);
+    succeeds(client, carom_client_step(client, &run)); /* the session keeps the scene it had */
+    succeeds(client, carom_client_close(client));
+    assert_null(carom_client_get_state(client));
 }
 
 static void count_bodies(void *user, const carom_client_state *s)

@@ -21,6 +21,8 @@ carom_client_code case_through(carom_client *client, int per_request,
 void case_gradient(carom_client *client);
 /* Snapshots, reset, replaced scene, refused requests. */
 void case_session(carom_client *client);
+/* Scene files: good, with force tables, wrong, missing. */
+void case_file(carom_client *client);
 /* A scene above 60 KB. */
 void case_large(carom_client *client);
 

@@ -78,6 +78,14 @@ static void session(void **state)
     stop(s);
 }
 
+static void scene_file(void **state)
+{
+    (void)state;
+    setup s = start("");
+    case_file(s.client);
+    stop(s);
+}
+
 static void large_scene(void **state)
 {
     (void)state;
@@ -185,6 +193,7 @@ static void lost_messages_and_gradients(void **state)
     lossy *l = start_lossy(20, &client);
     for (int k = 0; k < 3; k++) case_gradient(client);
     case_session(client);
+    case_file(client);
     case_large(client);
     stop_lossy(l, client);
 }
@@ -218,6 +227,7 @@ int main(void)
         cmocka_unit_test(trajectory),
         cmocka_unit_test(gradient),
         cmocka_unit_test(session),
+        cmocka_unit_test(scene_file),
         cmocka_unit_test(large_scene),
         cmocka_unit_test(lost_messages_change_nothing),
         cmocka_unit_test(lost_messages_and_gradients),

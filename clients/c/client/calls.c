@@ -27,22 +27,35 @@ static carom_client_code check_run(carom_client *c, const carom_client_run *run)
     return CAROM_CLIENT_OK;
 }
 
-/* Arrays of the forces: step and body, and three numbers each; one block. */
-static int place_forces(const carom_client_run *run, carom_step_request_t *m)
+static void put_force(carom_step_request_t *m, int k, const carom_client_force *f)
 {
-    const size_t n = (size_t)run->n_forces;
+    m->force_step[k] = f->step;
+    m->force_body[k] = f->body;
+    memcpy(m->step_force + 3 * k, f->force, sizeof f->force);
+}
+
+/* Arrays of the forces: step and body, and three numbers each; one block.  Those of the run and
+ * those of the file's tables, each in the order of steps. */
+static int place_forces(const carom_client_run *run, const carom_client_force *table, int n_table,
+                        carom_step_request_t *m)
+{
+    const size_t n = (size_t)run->n_forces + (size_t)n_table;
     double *block = malloc(n * (3 * sizeof(double) + 2 * sizeof(int32_t)) + 1);
     if (!block) return 0;
-    m->num_forces = run->n_forces;
-    m->num_force_values = 3 * run->n_forces;
+    m->num_forces = (int32_t)n;
+    m->num_force_values = (int32_t)(3 * n);
     m->step_force = block;
     m->force_step = (int32_t *)(void *)(block + 3 * n);
     m->force_body = m->force_step + n;
-    for (size_t k = 0; k < n; k++) {
-        m->force_step[k] = run->forces[k].step;
-        m->force_body[k] = run->forces[k].body;
-        memcpy(block + 3 * k, run->forces[k].force, 3 * sizeof(double));
+    int at = 0;
+    for (int i = 0; i < run->n_forces; i++) {
+        while (at < n_table && table[at].step <= run->forces[i].step) {
+            put_force(m, i + at, &table[at]);
+            at++;
+        }
+        put_force(m, i + at, &run->forces[i]);
     }
+    for (; at < n_table; at++) put_force(m, run->n_forces + at, &table[at]);
     return 1;
 }
 
@@ -57,9 +70,12 @@ carom_client_code carom_client_step(carom_client *c, const carom_client_run *run
 {
     crm_exchange x = {0};
     carom_step_request_t m = {0};
+    carom_client_force *table = NULL;
+    int n_table = 0;
     carom_client_code code = needs_scene(c);
     if (code >= 0) code = check_run(c, run);
     if (code < 0) return code;
+    if (!crm_client_file_forces(c, run->n_steps, &table, &n_table)) return no_memory(c);
     const crm_wire_header h = crm_client_next_header(c);
     m.utime = h.utime;
     m.client_id = h.client_id;
@@ -71,7 +87,9 @@ carom_client_code carom_client_step(carom_client *c, const carom_client_run *run
     m.want = CAROM_STEP_REQUEST_T_WANT_Q | CAROM_STEP_REQUEST_T_WANT_V |
              (run->contacts ? CAROM_STEP_REQUEST_T_WANT_CONTACTS : 0);
     m.record = (int8_t)run->record;
-    if (!place_forces(run, &m)) return no_memory(c);
+    const int placed = place_forces(run, table, n_table, &m);
+    free(table);
+    if (!placed) return no_memory(c);
     x.type = CRM_WIRE_STEP;
     x.step = &m;
     x.run = run;
@@ -79,6 +97,11 @@ carom_client_code carom_client_step(carom_client *c, const carom_client_run *run
     code = encode_step(&x, &m) ? crm_client_exchange(c, &x) : no_memory(c);
     free(m.step_force);
     return code;
+}
+
+const carom_client_state *carom_client_get_state(const carom_client *c)
+{
+    return c->has_state ? &c->state : NULL;
 }
 
 /* --- gradients */

@@ -63,6 +63,8 @@ void carom_client_destroy(carom_client *c)
     disconnect(c);
     if (c->has_scene) carom_scene_t_decode_cleanup(&c->scene);
     if (c->has_gradient) carom_parameter_gradient_t_decode_cleanup(&c->gradient);
+    crm_client_forget_file(c);
+    free(c->numbers);
     free(c->contacts);
     free(c);
 }
@@ -192,6 +194,8 @@ carom_client_code carom_client_open(carom_client *c, const carom_client_scene *s
         carom_scene_t_decode_cleanup(&copy);
         return code;
     }
+    crm_client_forget_file(c);
+    c->has_state = 0;
     if (c->has_scene) carom_scene_t_decode_cleanup(&c->scene);
     c->scene = copy;
     c->has_scene = 1;
@@ -230,6 +234,7 @@ carom_client_code carom_client_close(carom_client *c)
     /* A repeated request finds the session closed: what was asked for. */
     if (code == CAROM_CLIENT_E_SESSION && c->session > 0 && c->lcm) code = CAROM_CLIENT_OK;
     c->open = 0;
+    c->has_state = 0;
     return code;
 }
 

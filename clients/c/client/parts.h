@@ -71,13 +71,26 @@ struct carom_client {
     int has_scene;
     carom_parameter_gradient_t gradient;
     int has_gradient;
-    carom_contact_info *contacts; /* of the state in the callback */
+    struct crm_scene *file; /* opened from a file: its force tables act */
+    carom_client_state state;
+    int has_state;
+    double *numbers; /* of the state: q, then v */
+    int n_numbers_max;
+    carom_contact_info *contacts; /* of the state */
     int n_contacts_max;
 };
 
 /* Writes the sentence and returns the code. */
 carom_client_code crm_client_fail(carom_client *c, carom_client_code code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+
+/* --- open_file.c */
+
+/* Forgets the scene file. */
+void crm_client_forget_file(carom_client *c);
+/* What the tables of the file exert in `count` steps from the present one on: *n of them, in the
+ * order of steps; malloc.  0: no memory. */
+int crm_client_file_forces(const carom_client *c, int count, carom_client_force **forces, int *n);
 
 /* --- exchange.c */
 

@@ -46,20 +46,40 @@ static carom_contact_info contact_of(const carom_state_t *m, int k)
     return c;
 }
 
-static void call_back(carom_client *c, const carom_state_t *m)
+/* Room for the arrays of the state; 0: no memory. */
+static int reserve_state(carom_client *c, const carom_state_t *m)
 {
-    const crm_exchange *x = c->exchange;
     const int n = m->num_contacts;
-    if (!x->run->on_state) return;
+    const int n_numbers = 2 * m->num_q;
     if (n > c->n_contacts_max) {
         carom_contact_info *more = realloc(c->contacts, (size_t)n * sizeof *more);
-        if (!more) return;
+        if (!more) return 0;
         c->contacts = more;
         c->n_contacts_max = n;
     }
-    for (int k = 0; k < n; k++) c->contacts[k] = contact_of(m, k);
-    const carom_client_state s = view_state(m, c->contacts);
-    x->run->on_state(x->run->user, &s);
+    if (n_numbers > c->n_numbers_max) {
+        double *more = realloc(c->numbers, (size_t)n_numbers * sizeof *more);
+        if (!more) return 0;
+        c->numbers = more;
+        c->n_numbers_max = n_numbers;
+    }
+    return 1;
+}
+
+/* Keeps the state, and hands it to the caller. */
+static void call_back(carom_client *c, const carom_state_t *m)
+{
+    const crm_exchange *x = c->exchange;
+    const size_t width = (size_t)m->num_q;
+    c->has_state = reserve_state(c, m);
+    if (!c->has_state) return;
+    for (int k = 0; k < m->num_contacts; k++) c->contacts[k] = contact_of(m, k);
+    c->state = view_state(m, c->contacts);
+    c->state.q = c->numbers;
+    c->state.v = c->numbers + width;
+    if (width) memcpy(c->numbers, m->q, width * sizeof *c->numbers);
+    if (width) memcpy(c->numbers + width, m->v, width * sizeof *c->numbers);
+    if (x->run->on_state) x->run->on_state(x->run->user, &c->state);
 }
 
 static void release(crm_exchange *x, carom_state_t **m)

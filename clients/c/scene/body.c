@@ -97,8 +97,8 @@ static void read_shapes(crm_problems *problems, const crm_node *node, carom_body
     }
     const int n = one.json ? 1 : crm_length(&many);
     if (n == 0) return;
-    carom_shape *shapes = crm_resize(NULL, (size_t)n, sizeof *shapes);
-    memset(shapes, 0, (size_t)n * sizeof *shapes);
+    carom_shape *shapes = crm_make(problems, (size_t)n, sizeof *shapes);
+    if (!shapes) return;
     def->shapes = shapes;
     def->n_shapes = n;
     for (int k = 0; k < n; k++) {
@@ -135,8 +135,8 @@ static void read_forces(crm_problems *problems, const crm_node *node, crm_scene_
         crm_get_numbers(problems, &at, 3, body->def.force);
         return;
     }
-    body->rows = crm_resize(NULL, (size_t)n, sizeof *body->rows);
-    memset(body->rows, 0, (size_t)n * sizeof *body->rows);
+    body->rows = crm_make(problems, (size_t)n, sizeof *body->rows);
+    if (!body->rows) return;
     body->n_rows = n;
     for (int i = 0; i < n; i++) {
         const crm_node item = crm_item(&at, i);
@@ -163,7 +163,7 @@ void crm_body_read(crm_problems *problems, const crm_node *node, crm_scene_body 
     read_mass(problems, node, body);
     read_shapes(problems, node, &body->def);
     read_forces(problems, node, body);
-    if (problems->count == before) crm_body_mass(problems, node, body);
+    if (problems->count == before && !problems->no_memory) crm_body_mass(problems, node, body);
 }
 
 void crm_body_free(crm_scene_body *body)

@@ -11,21 +11,36 @@
 
 enum { PLACE_MAX = 256, TEXT_MAX = 1024, READ_BLOCK = 65536 };
 
-void *crm_resize(void *old, size_t n, size_t size)
+crm_problems crm_problems_of(const char *file)
 {
-    const size_t bytes = n > 0 && size > 0 ? n * size : 1;
-    void *p = size > 0 && n > SIZE_MAX / 2 / size ? NULL : realloc(old, bytes);
-    if (p) return p;
-    fputs("carom: out of memory\n", stderr);
-    exit(2);
+    const crm_problems problems = {file, 0, NULL, 0};
+    return problems;
+}
+
+int crm_faulty(const crm_problems *problems)
+{
+    return problems->count > 0 || problems->no_memory;
+}
+
+void *crm_make(crm_problems *problems, size_t n, size_t size)
+{
+    void *p = calloc(n ? n : 1, size);
+    if (!p) problems->no_memory = 1;
+    return p;
+}
+
+void *crm_regrow(crm_problems *problems, void *old, size_t n, size_t size)
+{
+    void *p = n > SIZE_MAX / 2 / size ? NULL : realloc(old, n * size);
+    if (!p) problems->no_memory = 1;
+    return p;
 }
 
 void crm_problems_free(crm_problems *problems)
 {
     for (int i = 0; i < problems->count; i++) free(problems->text[i]);
     free(problems->text);
-    problems->text = NULL;
-    problems->count = 0;
+    *problems = crm_problems_of(problems->file);
 }
 
 static void place_append(char *text, size_t size, const char *name, const char *dot)
@@ -50,6 +65,19 @@ void crm_node_place(const crm_node *node, char *text, size_t size)
     }
 }
 
+/* A copy of the sentence joins the list. */
+static void keep(crm_problems *problems, const char *sentence)
+{
+    const size_t n = (size_t)problems->count;
+    char **list = crm_regrow(problems, problems->text, n + 1, sizeof *list);
+    if (!list) return;
+    problems->text = list;
+    list[n] = crm_make(problems, strlen(sentence) + 1, 1);
+    if (!list[n]) return;
+    strcpy(list[n], sentence);
+    problems->count++;
+}
+
 void crm_fault(crm_problems *problems, const crm_node *at, const char *format, ...)
 {
     char place[PLACE_MAX] = "";
@@ -62,40 +90,42 @@ void crm_fault(crm_problems *problems, const crm_node *at, const char *format, .
     va_start(list, format);
     vsnprintf(sentence + n, sizeof sentence - (size_t)n, format, list);
     va_end(list);
-    problems->text = crm_resize(problems->text, (size_t)problems->count + 1, sizeof(char *));
-    char *copy = crm_resize(NULL, strlen(sentence) + 1, 1);
-    strcpy(copy, sentence);
-    problems->text[problems->count++] = copy;
+    keep(problems, sentence);
 }
 
 /* All bytes of the stream; NULL when reading fails. */
-static char *read_stream(FILE *f, size_t *length)
+static char *read_stream(crm_problems *problems, FILE *f, size_t *length)
 {
     char *text = NULL;
     size_t n = 0;
-    for (;;) {
-        text = crm_resize(text, n + READ_BLOCK, 1);
-        const size_t got = fread(text + n, 1, READ_BLOCK, f);
+    size_t got = READ_BLOCK;
+    while (got == READ_BLOCK) {
+        char *more = crm_regrow(problems, text, n + READ_BLOCK, 1);
+        if (!more) break;
+        text = more;
+        got = fread(text + n, 1, READ_BLOCK, f);
         n += got;
-        if (got < READ_BLOCK) break;
+    }
+    if (problems->no_memory || ferror(f)) {
+        free(text);
+        return NULL;
     }
     text[n] = '\0'; /* the last block is never full */
     *length = n;
-    if (!ferror(f)) return text;
-    free(text);
-    return NULL;
+    return text;
 }
 
 static char *read_file(crm_problems *problems, size_t *length)
 {
     if (strcmp(problems->file, "-") == 0) {
         problems->file = "standard input";
-        return read_stream(stdin, length);
+        return read_stream(problems, stdin, length);
     }
     FILE *f = fopen(problems->file, "rb");
-    char *text = f ? read_stream(f, length) : NULL;
+    char *text = f ? read_stream(problems, f, length) : NULL;
     if (f) fclose(f);
-    if (!text) crm_fault(problems, NULL, "cannot be read; check name and permissions");
+    if (!text && !problems->no_memory)
+        crm_fault(problems, NULL, "cannot be read; check name and permissions");
     return text;
 }
 
@@ -132,7 +162,7 @@ static json_t *load(crm_problems *problems, int of_python)
     json_t *json = json_loadb(text, length, 0, &error);
     if (!json) {
         crm_fault(problems, NULL, "line %d, column %d: %s", error.line, error.column, error.text);
-    } else if (crm_scan_duplicates(text, problems) == 0) {
+    } else if (crm_scan_duplicates(text, problems) == 0 && !problems->no_memory) {
         /* Keys that differ in the file only by escapes are left to jansson. */
         json_t *again = json_loadb(text, length, JSON_REJECT_DUPLICATES, &error);
         if (!again) crm_fault(problems, NULL, "line %d: %s", error.line, error.text);

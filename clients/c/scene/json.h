@@ -6,18 +6,23 @@
 
 #include <jansson.h>
 
-/* realloc of n elements; a program without memory says so and ends with exit code 2. */
-void *crm_resize(void *old, size_t n, size_t size);
-
-/* What is wrong with one file: sentences "FILE: place: fault; remedy".  Zero-initialize, set file.
- */
+/* What is wrong with one file: sentences "FILE: place: fault; remedy". */
 typedef struct crm_problems {
     const char *file; /* view; named first in every sentence */
     int count;
-    char **text; /* count of them */
+    char **text;   /* count of them */
+    int no_memory; /* memory ran out: what was read is not the whole file */
 } crm_problems;
 
+crm_problems crm_problems_of(const char *file);
 void crm_problems_free(crm_problems *problems);
+/* 1: something is wrong. */
+int crm_faulty(const crm_problems *problems);
+
+/* n elements, zeroed, at least one; realloc to n elements.  NULL: problems->no_memory is set, and
+ * `old` is as it was. */
+void *crm_make(crm_problems *problems, size_t n, size_t size);
+void *crm_regrow(crm_problems *problems, void *old, size_t n, size_t size);
 
 /* A value of the file.  json is NULL when the key is absent; up is the value that contains it. */
 typedef struct crm_node {

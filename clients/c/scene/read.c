@@ -98,8 +98,8 @@ static void read_bodies(crm_problems *problems, const crm_node *root, crm_scene 
 {
     const crm_node list = crm_member(root, "bodies");
     const int n = array_length(problems, &list, 1);
-    scene->bodies = crm_resize(NULL, (size_t)n, sizeof *scene->bodies);
-    memset(scene->bodies, 0, (size_t)n * sizeof *scene->bodies);
+    scene->bodies = crm_make(problems, (size_t)n, sizeof *scene->bodies);
+    if (!scene->bodies) return;
     scene->n_bodies = n;
     for (int i = 0; i < n; i++) {
         const crm_node item = crm_item(&list, i);
@@ -111,8 +111,8 @@ static void read_joints(crm_problems *problems, const crm_node *root, crm_scene 
 {
     const crm_node list = crm_member(root, "joints");
     const int n = array_length(problems, &list, 0);
-    scene->joints = crm_resize(NULL, (size_t)n, sizeof *scene->joints);
-    memset(scene->joints, 0, (size_t)n * sizeof *scene->joints);
+    scene->joints = crm_make(problems, (size_t)n, sizeof *scene->joints);
+    if (!scene->joints) return;
     scene->n_joints = n;
     for (int i = 0; i < n; i++) {
         const crm_node item = crm_item(&list, i);
@@ -139,14 +139,17 @@ crm_scene *crm_scene_read(crm_problems *problems)
 {
     json_t *json = crm_json_load(problems);
     if (!json) return NULL;
-    crm_scene *scene = crm_resize(NULL, 1, sizeof *scene);
-    memset(scene, 0, sizeof *scene);
+    crm_scene *scene = crm_make(problems, 1, sizeof *scene);
+    if (!scene) {
+        json_decref(json);
+        return NULL;
+    }
     scene->settings = carom_world_defaults();
     scene->duration = -1;
     scene->sample = -1;
     scene->json = json;
     read_all(problems, scene);
-    if (problems->count == 0) return scene;
+    if (!crm_faulty(problems)) return scene;
     crm_scene_free(scene);
     return NULL;
 }

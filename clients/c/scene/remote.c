@@ -31,62 +31,108 @@ void crm_setting_text(const char *name, double value, const char *words, char *t
     }
 }
 
-/* Names and values of all settings. */
-static void put_settings(const carom_world_settings *settings, carom_client_scene *out)
+/* Names and values of all settings.  0: no memory. */
+static int put_settings(const carom_world_settings *settings, carom_client_scene *out)
 {
-    const char **names = NULL;
-    char **values = NULL;
-    size_t n = 0;
-#define PUT(name, type, preset, unit, text)                                                        \
-    names = crm_resize(names, n + 1, sizeof *names);                                               \
-    values = crm_resize(values, n + 1, sizeof *values);                                            \
+#define ONE(name, type, preset, unit, text) +1
+    const size_t size = 0 CAROM_WORLD_SETTINGS(ONE);
+#undef ONE
+    const char **names = calloc(size, sizeof *names);
+    const char **values = calloc(size, sizeof *values);
+    char *text = calloc(size, SETTING_BYTES); /* all of them; values[0] */
+    int n = 0;
+    out->setting_names = names;
+    out->setting_values = values;
+    if (!names || !values || !text) {
+        free(text);
+        return 0;
+    }
+#define PUT(name, type, preset, unit, words)                                                       \
     names[n] = #name;                                                                              \
-    values[n] = crm_resize(NULL, SETTING_BYTES, 1);                                                \
-    crm_setting_text(#name, (double)settings->name, text, values[n++], SETTING_BYTES);
+    values[n] = text + n * SETTING_BYTES;                                                          \
+    crm_setting_text(#name, (double)settings->name, words, text + n++ * SETTING_BYTES,             \
+                     SETTING_BYTES);
     CAROM_WORLD_SETTINGS(PUT)
 #undef PUT
-    out->n_settings = (int)n;
-    out->setting_names = names;
-    out->setting_values = (const char *const *)values;
+    out->n_settings = n;
+    return 1;
 }
 
-carom_client_scene crm_scene_client(const crm_scene *scene)
+static int put_bodies(const crm_scene *scene, carom_client_scene *out)
 {
-    const size_t nb = (size_t)scene->n_bodies;
-    const size_t nj = (size_t)scene->n_joints;
-    carom_client_scene out;
-    memset(&out, 0, sizeof out);
-    carom_body_def *bodies = crm_resize(NULL, nb, sizeof *bodies);
-    const char **names = crm_resize(NULL, nb, sizeof *names);
-    carom_client_joint *joints = crm_resize(NULL, nj, sizeof *joints);
-    for (size_t i = 0; i < nb; i++) {
+    const size_t n = (size_t)scene->n_bodies;
+    carom_body_def *bodies = calloc(n + 1, sizeof *bodies);
+    const char **names = calloc(n + 1, sizeof *names);
+    out->bodies = bodies;
+    out->body_names = names;
+    if (!bodies || !names) return 0;
+    for (size_t i = 0; i < n; i++) {
         bodies[i] = scene->bodies[i].def;
         names[i] = scene->bodies[i].name ? scene->bodies[i].name : "";
     }
-    for (size_t k = 0; k < nj; k++) {
+    out->n_bodies = scene->n_bodies;
+    return 1;
+}
+
+static int put_joints(const crm_scene *scene, carom_client_scene *out)
+{
+    const size_t n = (size_t)scene->n_joints;
+    carom_client_joint *joints = calloc(n + 1, sizeof *joints);
+    out->joints = joints;
+    if (!joints) return 0;
+    for (size_t k = 0; k < n; k++) {
         joints[k].body_a = scene->joints[k].body_a;
         joints[k].body_b = scene->joints[k].body_b;
         joints[k].anchor = scene->joints[k].anchor;
     }
-    put_settings(&scene->settings, &out);
-    out.name = scene->name;
-    memcpy(out.gravity, scene->settings.gravity, sizeof out.gravity);
-    out.n_bodies = scene->n_bodies;
-    out.bodies = bodies;
-    out.body_names = names;
-    out.n_joints = scene->n_joints;
-    out.joints = joints;
-    return out;
+    out->n_joints = scene->n_joints;
+    return 1;
+}
+
+int crm_scene_client(const crm_scene *scene, carom_client_scene *out)
+{
+    memset(out, 0, sizeof *out);
+    out->name = scene->name;
+    memcpy(out->gravity, scene->settings.gravity, sizeof out->gravity);
+    if (put_settings(&scene->settings, out) && put_bodies(scene, out) && put_joints(scene, out)) {
+        return 1;
+    }
+    crm_scene_client_free(out);
+    return 0;
 }
 
 void crm_scene_client_free(carom_client_scene *scene)
 {
-    for (int k = 0; k < scene->n_settings; k++)
-        free((char *)scene->setting_values[k]); /* our own */
+    if (scene->n_settings) free((char *)scene->setting_values[0]); /* our own, as all of these */
     free((void *)scene->setting_values);
     free((void *)scene->setting_names);
     free((void *)scene->bodies);
     free((void *)scene->body_names);
     free((void *)scene->joints);
     memset(scene, 0, sizeof *scene);
+}
+
+int crm_scene_forces(const crm_scene *scene, int64_t start, int count, carom_client_force **list,
+                     int *n)
+{
+    size_t n_tables = 0;
+    *list = NULL;
+    *n = 0;
+    for (int i = 0; i < scene->n_bodies; i++) n_tables += scene->bodies[i].n_rows > 0;
+    if (!n_tables || !count) return 1;
+    double *force = malloc(3 * (size_t)scene->n_bodies * sizeof *force);
+    *list = malloc(n_tables * (size_t)count * sizeof **list);
+    const double dt = scene->settings.dt;
+    for (int k = 0; force && *list && k < count; k++) {
+        crm_scene_force(scene, (double)(start + k) * dt, dt, force);
+        for (int i = 0; i < scene->n_bodies; i++) {
+            if (!scene->bodies[i].n_rows) continue;
+            carom_client_force *f = &(*list)[(*n)++];
+            f->step = k;
+            f->body = i;
+            memcpy(f->force, &force[3 * i], sizeof f->force);
+        }
+    }
+    free(force);
+    return *n > 0;
 }

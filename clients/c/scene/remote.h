@@ -6,9 +6,14 @@
 #include "scene.h"
 
 /* The scene with settings as text; arrays belong to it, numbers and shapes to the crm_scene.  Force
- * tables are not part of it: crm_scene_force gives the force of each step. */
-carom_client_scene crm_scene_client(const crm_scene *scene);
+ * tables are not part of it.  0: no memory, *out is empty. */
+int crm_scene_client(const crm_scene *scene, carom_client_scene *out);
 void crm_scene_client_free(carom_client_scene *scene);
+
+/* The forces of the tables in `count` steps from step `start` on, in the order of steps: *n of
+ * them; malloc.  0: no memory. */
+int crm_scene_forces(const crm_scene *scene, int64_t start, int count, carom_client_force **list,
+                     int *n);
 
 /* Text of one setting as carom_world_settings_set reads it, terminated: a number, or the word where
  * only words are taken.  words: the meaning of the setting in the table, which lists them. */

@@ -39,7 +39,9 @@ static span read_string(scanner *s)
 
 static void open_level(scanner *s, int is_object)
 {
-    s->levels = crm_resize(s->levels, (size_t)s->depth + 1, sizeof *s->levels);
+    level *levels = crm_regrow(s->problems, s->levels, (size_t)s->depth + 1, sizeof *levels);
+    if (!levels) return;
+    s->levels = levels;
     level *l = &s->levels[s->depth++];
     memset(l, 0, sizeof *l);
     l->is_object = is_object;
@@ -53,7 +55,8 @@ static void report(scanner *s, span key)
     memcpy(name, key.text, (size_t)n);
     name[n] = '\0';
     /* nodes[0] is the root; nodes[i + 1] the place now read in the i-th open value */
-    crm_node *nodes = crm_resize(NULL, (size_t)s->depth + 1, sizeof *nodes);
+    crm_node *nodes = crm_make(s->problems, (size_t)s->depth + 1, sizeof *nodes);
+    if (!nodes) return;
     nodes[0] = crm_root(NULL);
     for (int i = 0; i < s->depth; i++) {
         nodes[i + 1] = s->levels[i].node;
@@ -95,10 +98,13 @@ static void take_string(scanner *s)
     const span text = read_string(s);
     while (isspace((unsigned char)*s->at)) s->at++;
     if (*s->at != ':' || !s->depth) return;
-    s->keys = crm_resize(s->keys, (size_t)s->n_keys + 1, sizeof *s->keys);
-    s->keys[s->n_keys++] = text;
     level *l = &s->levels[s->depth - 1];
-    l->name = crm_resize(l->name, (size_t)text.length + 1, 1);
+    span *keys = crm_regrow(s->problems, s->keys, (size_t)s->n_keys + 1, sizeof *keys);
+    if (keys) s->keys = keys;
+    char *name = crm_regrow(s->problems, l->name, (size_t)text.length + 1, 1);
+    if (name) l->name = name;
+    if (!keys || !name) return;
+    s->keys[s->n_keys++] = text;
     memcpy(l->name, text.text, (size_t)text.length);
     l->name[text.length] = '\0';
 }
@@ -109,7 +115,7 @@ int crm_scan_duplicates(const char *text, crm_problems *problems)
     memset(&s, 0, sizeof s);
     s.at = text;
     s.problems = problems;
-    while (*s.at) {
+    while (*s.at && !problems->no_memory) {
         const char c = *s.at;
         if (c == '"') {
             take_string(&s);

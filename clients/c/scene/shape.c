@@ -28,8 +28,8 @@ static carom_vec2 *read_vertices(crm_problems *problems, const crm_node *node, c
         return NULL;
     }
     const int n = crm_length(&list);
-    carom_vec2 *v = crm_resize(NULL, (size_t)n, sizeof *v);
-    memset(v, 0, (size_t)n * sizeof *v);
+    carom_vec2 *v = crm_make(problems, (size_t)n, sizeof *v);
+    if (!v) return NULL;
     shape->count = n;
     shape->vertices = v;
     for (int i = 0; i < n; i++) {
@@ -46,7 +46,8 @@ static int read_circle(crm_problems *problems, const crm_node *node, carom_shape
 {
     const crm_node radius = crm_member(node, "radius");
     const crm_node center = crm_member(node, "center");
-    carom_vec2 *v = crm_resize(NULL, 1, sizeof *v);
+    carom_vec2 *v = crm_make(problems, 1, sizeof *v);
+    if (!v) return 0;
     double xy[2] = {0, 0};
     shape->vertices = v;
     shape->count = 1;

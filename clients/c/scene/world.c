@@ -20,7 +20,8 @@ static carom_status add_bodies(const crm_scene *scene, carom_world *w, char *why
 static carom_status move_body(carom_world *w, int body, double dx, double dy)
 {
     const size_t n = 3 * (size_t)carom_world_n_bodies(w);
-    double *q = crm_resize(NULL, n, sizeof *q);
+    double *q = malloc(n * sizeof *q);
+    if (!q) return CAROM_E_MEMORY;
     memcpy(q, carom_world_q(w), n * sizeof *q);
     const double c = cos(q[3 * body]);
     const double s = sin(q[3 * body]);

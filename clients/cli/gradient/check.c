@@ -1,6 +1,7 @@
 #include "gradient/check.h"
 
 #include "clients/c/scene/mass.h"
+#include "io/memory.h"
 #include "io/progress.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
 #include "gradient/gradient.h"
 
+#include "io/memory.h"
 #include "io/progress.h"
 
 #include <stdio.h>

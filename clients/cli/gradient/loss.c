@@ -1,4 +1,5 @@
 #include "gradient/loss.h"
+#include "io/memory.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -88,7 +89,7 @@ int crm_loss_read(crm_problems *problems, const crm_scene *scene, long n_steps, 
     }
     qsort(loss->terms, (size_t)n, sizeof *loss->terms, compare_steps);
     json_decref(json);
-    return problems->count == 0;
+    return !crm_faulty(problems);
 }
 
 void crm_loss_free(crm_loss *loss)

@@ -1,6 +1,7 @@
 #include "command.h"
 
 #include "clients/c/scene/json.h"
+#include "io/memory.h"
 
 #include <stdarg.h>
 #include <stdio.h>

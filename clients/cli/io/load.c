@@ -11,6 +11,7 @@
 void crm_print_problems(const crm_problems *problems)
 {
     for (int i = 0; i < problems->count; i++) fprintf(stderr, "%s\n", problems->text[i]);
+    if (problems->no_memory) fprintf(stderr, "%s: out of memory\n", problems->file);
 }
 
 /* --set KEY=VALUE */
@@ -82,7 +83,7 @@ static int plan_times(const crm_arguments *a, crm_run *run)
 
 int crm_load(const crm_arguments *arguments, crm_run *run)
 {
-    crm_problems problems = {arguments->files[0], 0, NULL};
+    crm_problems problems = crm_problems_of(arguments->files[0]);
     memset(run, 0, sizeof *run);
     run->scene = crm_scene_read(&problems);
     run->file = problems.file;

@@ -1,4 +1,5 @@
 /* A problem file as a carom_contact_problem: rows of two bodies, u = -q/M. */
+#include "io/memory.h"
 #include "io/progress.h"
 #include "lcp/file.h"
 

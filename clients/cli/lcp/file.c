@@ -1,4 +1,5 @@
 #include "lcp/file.h"
+#include "io/memory.h"
 
 #include <limits.h>
 #include <stdlib.h>
@@ -99,9 +100,9 @@ int crm_lcp_read(crm_problems *problems, crm_lcp *lcp)
     lcp->q = read_array(problems, &root, "q", 3 * n);
     lcp->mu = read_array(problems, &root, "mu", lcp->n_contacts);
     lcp->c = read_array(problems, &root, "c", lcp->n_contacts);
-    if (!problems->count) check_numbers(problems, lcp);
+    if (!crm_faulty(problems)) check_numbers(problems, lcp);
     json_decref(json);
-    return problems->count == 0;
+    return !crm_faulty(problems);
 }
 
 static void free_triplets(crm_triplets *m)

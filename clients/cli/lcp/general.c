@@ -2,6 +2,7 @@
  * z = (l_n, l+, l-, g): n_c normal multipliers, then three blocks of n_f, one entry for each
  * contact with friction.  G = -[J_n; J_f; 0], F = -[[0,0,0], [0,0,E], [mu,-E',0]], y = -l_e. */
 #include "carom/lcp.h"
+#include "io/memory.h"
 #include "io/progress.h"
 #include "lcp/file.h"
 

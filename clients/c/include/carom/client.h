@@ -70,6 +70,10 @@ typedef struct carom_client_scene {
  * above 60 KB go in pieces; above 4 MB they are refused. */
 CAROM_API carom_client_code carom_client_open(carom_client *client,
                                               const carom_client_scene *scene);
+/* The same with a scene file (docs/scene.md).  Its force tables act in every step; its duration and
+ * sample interval are left to the caller.  CAROM_CLIENT_E_ARGUMENT: the file is not valid; the
+ * error names file, place and remedy of the first fault.  NULL: no file. */
+CAROM_API carom_client_code carom_client_open_file(carom_client *client, const char *path);
 CAROM_API carom_client_code carom_client_close(carom_client *client);
 
 /* A state as the server published it; arrays are valid during the callback. */
@@ -110,6 +114,8 @@ typedef struct carom_client_run {
 } carom_client_run;
 
 CAROM_API carom_client_code carom_client_step(carom_client *client, const carom_client_run *run);
+/* The last state that steps of the open scene brought; valid until the next call.  NULL: none. */
+CAROM_API const carom_client_state *carom_client_get_state(const carom_client *client);
 
 /* Parameters of a gradient: bits, the same as in parameter_gradient_t. */
 enum {
