@@ -134,5 +134,8 @@ int crm_scene_forces(const crm_scene *scene, int64_t start, int count, carom_cli
         }
     }
     free(force);
-    return *n > 0;
+    if (*n) return 1;
+    free(*list);
+    *list = NULL;
+    return 0;
 }
