@@ -287,6 +287,14 @@ static void explain_counts(void **state)
         if (!strstr(c.out, wanted[k])) fail_msg("no \"%s\" in\n%s", wanted[k], c.out);
     }
     program_free(&c);
+    /* no static body: no pair of them, without a sign */
+    program_write("one.json", "{\"format\":\"carom-scene/1\",\"duration\":1,\"bodies\":["
+                              "{\"mass\":1,\"shape\":{\"type\":\"circle\",\"radius\":1}}]}");
+    c = program_run("explain one.json");
+    assert_int_equal(c.code, 0);
+    assert_non_null(strstr(c.out, "pairs                       0  neither body is dynamic"));
+    assert_null(strstr(c.out, " -0 "));
+    program_free(&c);
 }
 
 int main(void)

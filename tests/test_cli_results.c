@@ -23,8 +23,8 @@ static void gradient_has_its_arrays(void **state)
         size_t length;
     } arrays[] = {{"q0", 6},       {"v0", 6},          {"mass", 2},    {"inertia", 2},
                   {"friction", 2}, {"restitution", 2}, {"gravity", 2}, {"radius", 2},
-                  {"vertices", 2}, {"anchors", 0},     {"force", 6}};
-    assert_int_equal(json_object_size(g), 11);
+                  {"vertices", 2}, {"anchors", 0},     {"force", 6},   {"dt", 1}};
+    assert_int_equal(json_object_size(g), 12);
     for (size_t k = 0; k < sizeof arrays / sizeof arrays[0]; k++) {
         const json_t *a = json_object_get(g, arrays[k].name);
         if (!json_is_array(a) || json_array_size(a) != arrays[k].length)
@@ -59,17 +59,18 @@ static void gradient_of_a_free_body(void **state)
     const double s = 0.0625 * 10;
     const double x = 3 + 5 * s / 2;
     program_call c =
-        program_run("gradient free.json --loss - --wrt v0,mass,q0,force <free_loss.json");
+        program_run("gradient free.json --loss - --wrt v0,mass,q0,force,dt <free_loss.json");
     assert_int_equal(c.code, 0);
     json_t *all = program_line(c.out, 0);
     json_t *g = json_object_get(all, "gradient");
-    assert_int_equal(json_object_size(g), 4);
+    assert_int_equal(json_object_size(g), 5);
     /* a dozen roundings of numbers below 50 */
     assert_near(program_number(all, "loss"), 0.5 * (x - 1) * (x - 1) + 21, 1e-13);
     assert_near(program_entry(g, "q0", 1), x - 1, 1e-13);
     assert_near(program_entry(g, "v0", 1), x - 1 + 7, 1e-13);
     assert_near(program_entry(g, "mass", 0), (x - 1) * (-5 * s / 4), 1e-13);
     assert_near(program_entry(g, "force", 1), (x - 1) * s / 2, 1e-13);
+    assert_near(program_entry(g, "dt", 0), (x - 1) * (4 * 3 + 2.5 * 0.25 * 20), 1e-12);
     json_decref(all);
     program_free(&c);
 }
@@ -134,6 +135,7 @@ static void wrong_losses(void **state)
     program_refuses("gradient %/scenes/a_slide.json --loss loss.json --wrt mass,colour",
                     "\"colour\" is not known");
     program_refuses("gradient %/scenes/a_slide.json --loss loss.json --check=0", "--check: \"0\"");
+    program_refuses("gradient %/scenes/a_slide.json --loss loss.json --wrt ''", "--wrt: \"\"");
 }
 
 /* --- contact, lcp */

@@ -19,7 +19,7 @@ typedef struct pairs {
 
 static double choose2(double n)
 {
-    return n * (n - 1) / 2;
+    return n > 1 ? n * (n - 1) / 2 : 0;
 }
 
 static int can_touch(const carom_body_def *b)

@@ -15,7 +15,7 @@ static int choose_wanted(const crm_arguments *a, crm_gradient *g)
 {
     const char *list = crm_argument(a, "--wrt");
     for (int k = 0; k < CRM_N_WRT; k++) g->wanted[k] = !list;
-    while (list && *list) {
+    while (list) {
         const size_t n = strcspn(list, ",");
         int k = 0;
         while (crm_wrt_names[k] &&
@@ -26,11 +26,11 @@ static int choose_wanted(const crm_arguments *a, crm_gradient *g)
             return crm_usage_error(
                 a->command,
                 "--wrt: \"%.*s\" is not known; known are q0, v0, mass, inertia, "
-                "friction, restitution, gravity, radius, vertices, anchors, force",
+                "friction, restitution, gravity, radius, vertices, anchors, force, dt",
                 (int)n, list);
         }
         g->wanted[k] = 1;
-        list += n + (list[n] == ',');
+        list = list[n] ? list + n + 1 : NULL;
     }
     return CRM_DONE;
 }
@@ -257,7 +257,7 @@ const crm_command crm_command_gradient = {
     "a loss of the run and its exact gradient, as one JSON object",
     "  --loss LOSS        file with the terms, \"-\" for standard input\n"
     "  --wrt NAMES        of q0, v0, mass, inertia, friction, restitution, gravity, radius,\n"
-    "                     vertices, anchors, force; all when not given\n"
+    "                     vertices, anchors, force, dt; all when not given\n"
     "  --check[=N]        N entries of each array (20) beside central differences\n" CRM_LOAD_HELP
     "  --out FILE         where the result goes, standard output otherwise\n",
     options,

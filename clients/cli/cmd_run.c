@@ -47,7 +47,7 @@ static carom_status run_steps(const crm_run *run, carom_world *w, int quiet, crm
             put_present(out, w);
             written = k;
         }
-        crm_progress_show(&bar, k, run->n_steps);
+        crm_progress_show(&bar, (double)k, (double)run->n_steps);
     }
     if (carom_world_steps(w) != written) put_present(out, w);
     crm_progress_end(&bar);

@@ -66,7 +66,7 @@ static carom_client_code send_all(carom_client *client, sending *s, int quiet)
     for (long k = 0; code >= 0 && k < s->run->n_steps && !crm_interrupted(); k += BATCH) {
         const long left = s->run->n_steps - k;
         code = send_steps(client, s, k, left < BATCH ? (int)left : BATCH);
-        crm_progress_show(&bar, k, s->run->n_steps);
+        crm_progress_show(&bar, (double)k, (double)s->run->n_steps);
     }
     crm_progress_end(&bar);
     return code;

@@ -13,6 +13,8 @@
 /* Relative step sizes: a truncation error of h^2 against a rounding error of eps/h. */
 static const double relative_step[CRM_CHECK_STEPS] = {1e-5, 1e-6};
 
+enum { RUNS = 2 * CRM_CHECK_STEPS /* of one entry: two for each step size */ };
+
 /* Sides that differ by more than this, relative, belong to a kink; their own error is of first
  * order in the step. */
 #define KINK_TOL 1e-3
@@ -26,6 +28,8 @@ typedef struct checker {
     double *force; /* scratch, 3 n_bodies */
     double length; /* scale of the scene [m] */
     double weight; /* largest weight [N] */
+    crm_progress bar;
+    double n_done, n_all; /* steps of all runs */
 } checker;
 
 /* Where an entry of a shape array lies. */
@@ -63,7 +67,7 @@ static double *shape_number(const crm_scene *s, crm_wrt array, int index, int *b
     return index % 2 ? &v->y : &v->x;
 }
 
-/* A world whose shape or anchor, if the array is one of these, is changed by delta. */
+/* A world whose shape, anchor or step, if the array is one of these, is changed by delta. */
 static carom_world *perturbed_world(const checker *c, crm_wrt array, int index, double delta)
 {
     carom_world *w = NULL;
@@ -73,14 +77,15 @@ static carom_world *perturbed_world(const checker *c, crm_wrt array, int index, 
     const int of_shape = array == CRM_RADIUS || array == CRM_VERTICES;
     int body = 0;
     double *x = of_shape ? shape_number(c->run->scene, array, index, &body) : NULL;
+    if (array == CRM_DT) x = &c->run->scene->settings.dt;
     const double kept = x ? *x : 0;
     crm_scene_body *b = &c->run->scene->bodies[body];
     const carom_body_def def = b->def;
     if (x) *x += delta;
-    if (x && b->def.type == CAROM_DYNAMIC) crm_body_follow(b);
+    if (of_shape && b->def.type == CAROM_DYNAMIC) crm_body_follow(b);
     crm_scene_world(c->run->scene, array == CRM_ANCHORS ? &shift : NULL, &w, why, sizeof why);
     if (x) *x = kept;
-    if (x) b->def = def;
+    if (of_shape) b->def = def;
     if (w && carom_world_seal(w) >= 0) return w;
     carom_world_destroy(w);
     return NULL;
@@ -114,16 +119,19 @@ static carom_status perturb_start(checker *c, carom_world *w, crm_wrt array, int
     return s;
 }
 
-/* Loss of the run with one entry changed by delta; NaN when it cannot be computed. */
+/* Loss of the run with one entry changed by delta; NaN when it cannot be computed, or the user does
+ * not want it any more. */
 static double perturbed_loss(checker *c, crm_wrt array, int index, double delta)
 {
     const crm_scene *scene = c->run->scene;
+    const double dt = scene->settings.dt;
     carom_world *w = perturbed_world(c, array, index, delta);
     if (!w) return NAN;
     carom_status s = perturb_start(c, w, array, index, delta);
     double loss = crm_loss_at(c->loss, 0, carom_world_q(w), carom_world_v(w));
-    for (long k = 1; s >= 0 && k <= c->run->n_steps; k++) {
-        int forced = crm_scene_force(scene, carom_world_time(w), scene->settings.dt, c->force);
+    long k = 1;
+    for (; s >= 0 && k <= c->run->n_steps && !crm_interrupted(); k++) {
+        int forced = crm_scene_force(scene, (double)(k - 1) * dt, dt, c->force);
         if (array == CRM_FORCE) {
             if (!forced) memset(c->force, 0, 3 * (size_t)scene->n_bodies * sizeof(double));
             c->force[index] += delta;
@@ -131,9 +139,11 @@ static double perturbed_loss(checker *c, crm_wrt array, int index, double delta)
         }
         s = carom_world_step(w, forced ? c->force : NULL, NULL);
         if (s >= 0) loss += crm_loss_at(c->loss, k, carom_world_q(w), carom_world_v(w));
+        crm_progress_show(&c->bar, c->n_done + (double)k, c->n_all);
     }
+    c->n_done += (double)c->run->n_steps;
     carom_world_destroy(w);
-    return s < 0 ? NAN : loss;
+    return s < 0 || k <= c->run->n_steps ? NAN : loss;
 }
 
 /* Difference quotients with step h.  side 0: the central one, and those of both sides; +1 or -1: of
@@ -171,6 +181,7 @@ static double entry_scale(const checker *c, crm_wrt array, int index)
     case CRM_VERTICES:
     case CRM_ANCHORS: return c->length;
     case CRM_FORCE: return fmax(1, c->weight);
+    case CRM_DT: return c->run->scene->settings.dt;
     default: return 1;
     }
 }
@@ -337,18 +348,19 @@ void crm_check_run(crm_check *check, const crm_gradient *g, const crm_run *run,
     check->worst = -1;
     if (!checker_open(&c)) return;
     choose_all(&c, check, per_array);
-    crm_progress bar = crm_progress_start("check", quiet);
+    c.bar = crm_progress_start("check", quiet);
+    c.n_all = (double)RUNS * check->count * (double)run->n_steps;
     int done = 0;
-    while (done < check->count && !crm_interrupted()) {
+    while (done < check->count) {
         check_entry(&c, &check->entries[done]);
+        if (crm_interrupted()) break; /* in the middle of an entry */
         if (check->worst < 0 ||
             check->entries[done].disagreement > check->entries[check->worst].disagreement) {
             check->worst = done;
         }
         done++;
-        crm_progress_show(&bar, done, check->count);
     }
-    crm_progress_end(&bar);
+    crm_progress_end(&c.bar);
     check->interrupted = done < check->count;
     check->count = done;
     free(c.q);

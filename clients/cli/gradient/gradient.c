@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const crm_wrt_names[CRM_N_WRT + 1] = {"q0",       "v0",          "mass",    "inertia",
-                                                  "friction", "restitution", "gravity", "radius",
-                                                  "vertices", "anchors",     "force",   NULL};
+const char *const crm_wrt_names[CRM_N_WRT + 1] = {
+    "q0",     "v0",       "mass",    "inertia", "friction", "restitution", "gravity",
+    "radius", "vertices", "anchors", "force",   "dt",       NULL};
 
 void crm_gradient_prepare(crm_gradient *g, const crm_scene *scene)
 {
@@ -22,7 +22,7 @@ void crm_gradient_prepare(crm_gradient *g, const crm_scene *scene)
         for (int k = 0; k < def->n_shapes; k++) n_vertices += def->shapes[k].count;
     }
     const int count[CRM_N_WRT] = {
-        3 * n, 3 * n, n, n, n, n, 2, n_shapes, 2 * n_vertices, 4 * scene->n_joints, 3 * n};
+        3 * n, 3 * n, n, n, n, n, 2, n_shapes, 2 * n_vertices, 4 * scene->n_joints, 3 * n, 1};
     memset(g, 0, sizeof *g);
     for (int a = 0; a < CRM_N_WRT; a++) {
         g->count[a] = count[a];
@@ -52,7 +52,7 @@ static int run_forward(crm_gradient *g, const crm_run *run, const crm_loss *loss
         s = carom_tape_step(tape, forced ? force : NULL, NULL);
         if (s < 0) break;
         g->loss += crm_loss_at(loss, carom_world_steps(w), carom_world_q(w), carom_world_v(w));
-        crm_progress_show(&bar, carom_world_steps(w), run->n_steps);
+        crm_progress_show(&bar, (double)carom_world_steps(w), (double)run->n_steps);
     }
     g->seconds_forward = crm_clock() - start;
     crm_progress_end(&bar);
@@ -84,6 +84,7 @@ static carom_gradient engine_arrays(const crm_gradient *g)
     out.restitution = w[CRM_RESTITUTION] ? g->x[CRM_RESTITUTION] : NULL;
     out.gravity = w[CRM_GRAVITY] ? g->x[CRM_GRAVITY] : NULL;
     out.force = w[CRM_FORCE] ? g->x[CRM_FORCE] : NULL;
+    out.dt = w[CRM_DT] ? g->x[CRM_DT] : NULL;
     out.radius = w[CRM_RADIUS] ? g->x[CRM_RADIUS] : NULL;
     out.vertices = w[CRM_VERTICES] ? (carom_vec2 *)(void *)g->x[CRM_VERTICES] : NULL;
     out.anchors = w[CRM_ANCHORS] ? (carom_vec2 *)(void *)g->x[CRM_ANCHORS] : NULL;

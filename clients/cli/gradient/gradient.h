@@ -17,6 +17,7 @@ typedef enum crm_wrt {
     CRM_VERTICES,
     CRM_ANCHORS,
     CRM_FORCE,
+    CRM_DT,
     CRM_N_WRT
 } crm_wrt;
 

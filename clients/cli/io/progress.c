@@ -51,19 +51,19 @@ crm_progress crm_progress_start(const char *title, int silent)
     return p;
 }
 
-void crm_progress_show(crm_progress *progress, long done, long total)
+void crm_progress_show(crm_progress *progress, double done, double total)
 {
-    if (progress->silent || total <= 0) return;
+    if (progress->silent || !(total > 0)) return;
     const double now = crm_clock();
     if (now - progress->start < 1 || now - progress->last < 0.1) return;
     progress->last = now;
     progress->shown = 1;
-    const double part = (double)done / (double)total;
+    const double part = done / total;
     char bar[BAR_WIDTH + 1];
     for (int i = 0; i < BAR_WIDTH; i++) bar[i] = (double)i < part * BAR_WIDTH ? '#' : '.';
     bar[BAR_WIDTH] = '\0';
     const double left = done > 0 ? (now - progress->start) * (1 / part - 1) : 0;
-    fprintf(stderr, "\r%s [%s] %3.0f %%  %ld of %ld, %.0f s left \033[K", progress->title, bar,
+    fprintf(stderr, "\r%s [%s] %3.0f %%  %.0f of %.0f, %.0f s left \033[K", progress->title, bar,
             100 * part, done, total, left);
     fflush(stderr);
 }

@@ -20,7 +20,7 @@ typedef struct crm_progress {
 } crm_progress;
 
 crm_progress crm_progress_start(const char *title, int silent);
-void crm_progress_show(crm_progress *progress, long done, long total);
+void crm_progress_show(crm_progress *progress, double done, double total);
 /* Wipes the bar. */
 void crm_progress_end(crm_progress *progress);
 
