@@ -1,0 +1,190 @@
+/* The step on random scenes: it ends within counted bounds, nothing is NaN, nothing passes through
+ * anything, and a step that fails leaves the world as it was.
+ *
+ * Usage: test_random_scenes [scenes (300) [first seed (1) [steps (30) [integrator]]]]; prints what
+ * the statuses were and the seeds of the worst cases when given. */
+#include "near.h"
+#include "random_scene.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { N_INTEGRATORS = 3, N_STATUSES = 12 };
+static const char *const NAMES[N_INTEGRATORS] = {"euler", "located", "fixed"};
+
+static int n_scenes = 300;
+static uint64_t first_seed = 1;
+static int n_steps = 30;
+static int only = -1;
+static int verbose = 0;
+
+/* The largest value of something and the scene where it was. */
+typedef struct record {
+    double value;
+    uint64_t seed;
+    int step;
+} record;
+
+typedef struct tally {
+    long scenes, steps;
+    long stuck; /* scenes given up: a step failed twice */
+    long status[N_STATUSES];
+    double factorizations;
+    record overlap, residual, busiest, substeps, events, drift, growth;
+} tally;
+
+static int status_row(carom_status e)
+{
+    return e >= 0 ? e : 3 - e;
+}
+
+static void note(record *r, double value, uint64_t seed, int step)
+{
+    if (!(value > r->value)) return;
+    r->value = value;
+    r->seed = seed;
+    r->step = step;
+}
+
+static void check_finite(const random_scene *s, uint64_t seed, int step)
+{
+    const double *q = carom_world_q(s->world);
+    const double *v = carom_world_v(s->world);
+    for (int k = 0; k < 3 * s->n_bodies; k++) {
+        if (isfinite(q[k]) && isfinite(v[k])) continue;
+        fail_msg("seed %llu, step %d: number %d of the state is not finite",
+                 (unsigned long long)seed, step, k);
+    }
+}
+
+/* One step; on failure the world must be as it was. */
+static carom_status step_or_nothing(random_scene *s, uint64_t seed, carom_step_stats *stats)
+{
+    double q[3 * RANDOM_SCENE_BODIES];
+    double v[3 * RANDOM_SCENE_BODIES];
+    const size_t bytes = 3 * (size_t)s->n_bodies * sizeof *q;
+    const long before = carom_world_steps(s->world);
+    memcpy(q, carom_world_q(s->world), bytes);
+    memcpy(v, carom_world_v(s->world), bytes);
+    const carom_status e = carom_world_step(s->world, NULL, stats);
+    if (e >= 0) return e;
+    if (carom_world_error(s->world)[0] == '\0') {
+        fail_msg("seed %llu: a failure without a word", (unsigned long long)seed);
+    }
+    if (carom_world_steps(s->world) != before || memcmp(q, carom_world_q(s->world), bytes) != 0 ||
+        memcmp(v, carom_world_v(s->world), bytes) != 0) {
+        fail_msg("seed %llu: a failed step changed the world", (unsigned long long)seed);
+    }
+    return e;
+}
+
+static void note_step(tally *t, const random_scene *s, const carom_step_stats *x, uint64_t seed,
+                      int step)
+{
+    int a, b;
+    const double overlap = random_scene_overlap(s, &a, &b);
+    t->steps++;
+    t->factorizations += x->factorizations;
+    note(&t->overlap, overlap, seed, step);
+    note(&t->residual, x->residual, seed, step);
+    note(&t->busiest, x->factorizations, seed, step);
+    note(&t->substeps, x->n_substeps, seed, step);
+    note(&t->events, x->n_events, seed, step);
+    note(&t->drift, x->joint_drift, seed, step);
+}
+
+static void run_scene(int integrator, uint64_t seed, tally *t)
+{
+    static random_scene s;
+    carom_world_settings set = carom_world_defaults();
+    set.integrator = integrator;
+    random_scene_make(seed, &set, &s);
+    t->scenes++;
+    int failed = 0;
+    for (int k = 0; k < n_steps && failed < 2; k++) {
+        carom_step_stats x;
+        const double energy = carom_world_energy(s.world);
+        const carom_status e = step_or_nothing(&s, seed, &x);
+        t->status[status_row(e)]++;
+        failed = e < 0 ? failed + 1 : 0;
+        check_finite(&s, seed, k);
+        if (e < 0) {
+            if (verbose) {
+                print_message("%s, seed %llu, step %d: %s\n", NAMES[integrator],
+                              (unsigned long long)seed, k, carom_world_error(s.world));
+            }
+            continue;
+        }
+        note_step(t, &s, &x, seed, k);
+        if (!s.has_kinematic) note(&t->growth, carom_world_energy(s.world) - energy, seed, k);
+        if (random_scene_escaped(&s) >= 0) {
+            print_message("%s, seed %llu, step %d: body %d left the room\n", NAMES[integrator],
+                          (unsigned long long)seed, k, random_scene_escaped(&s));
+            break;
+        }
+    }
+    t->stuck += failed >= 2;
+    carom_world_destroy(s.world);
+}
+
+static void print_record(const char *what, const record *r)
+{
+    print_message("  %-28s %10.3g  seed %llu, step %d\n", what, r->value,
+                  (unsigned long long)r->seed, r->step);
+}
+
+static void print_tally(const char *name, const tally *t)
+{
+    print_message("%s: %ld scenes, %ld steps, %ld scenes given up; %.2f factorizations per step\n",
+                  name, t->scenes, t->steps, t->stuck, t->factorizations / (double)t->steps);
+#define PRINT_STATUS(id, value, text)                                                              \
+    if (t->status[status_row(id)]) print_message("  %-28s %10ld\n", #id, t->status[status_row(id)]);
+    CAROM_STATUS_TABLE(PRINT_STATUS)
+#undef PRINT_STATUS
+    print_record("overlap [m]", &t->overlap);
+    print_record("residual", &t->residual);
+    print_record("factorizations in a step", &t->busiest);
+    print_record("sub-steps in a step", &t->substeps);
+    print_record("events in a step", &t->events);
+    print_record("joint drift [m]", &t->drift);
+    print_record("energy gained in a step [J]", &t->growth);
+}
+
+static void run_integrator(int integrator)
+{
+    static tally t;
+    memset(&t, 0, sizeof t);
+    if (only >= 0 && only != integrator) return;
+    for (int k = 0; k < n_scenes; k++) run_scene(integrator, first_seed + (uint64_t)k, &t);
+    if (verbose) print_tally(NAMES[integrator], &t);
+}
+
+static void euler(void **state)
+{
+    (void)state;
+    run_integrator(CAROM_EULER);
+}
+
+static void located(void **state)
+{
+    (void)state;
+    run_integrator(CAROM_LOCATED);
+}
+
+static void fixed(void **state)
+{
+    (void)state;
+    run_integrator(CAROM_FIXED);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(euler), cmocka_unit_test(located),
+                                       cmocka_unit_test(fixed)};
+    if (argc > 1) n_scenes = atoi(argv[1]);
+    if (argc > 2) first_seed = strtoull(argv[2], NULL, 10);
+    if (argc > 3) n_steps = atoi(argv[3]);
+    if (argc > 4) only = atoi(argv[4]);
+    verbose = argc > 1;
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
