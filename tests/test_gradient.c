@@ -416,6 +416,13 @@ static void located_against_differences(void **state)
     scene_integrator = CAROM_EULER;
 }
 
+static void fixed_against_differences(void **state)
+{
+    scene_integrator = CAROM_FIXED;
+    check_scene(*state);
+    scene_integrator = CAROM_EULER;
+}
+
 /* --- closed forms ------------------------------------------------------------------------------
  */
 
@@ -537,17 +544,19 @@ static void free_flight(void **state)
 
 int main(void)
 {
-    struct CMUnitTest tests[2 * N_SCENES + 5];
+    static const CMUnitTestFunction maps[3] = {against_differences, located_against_differences,
+                                               fixed_against_differences};
+    struct CMUnitTest tests[3 * N_SCENES + 5];
     memset(tests, 0, sizeof tests);
-    for (int k = 0; k < 2 * N_SCENES; k++) {
+    for (int k = 0; k < 3 * N_SCENES; k++) {
         tests[k].name = SCENES[k % N_SCENES].name;
-        tests[k].test_func = k < N_SCENES ? against_differences : located_against_differences;
+        tests[k].test_func = maps[k / N_SCENES];
         tests[k].initial_state = (void *)(size_t)&SCENES[k % N_SCENES];
     }
     const struct CMUnitTest closed[5] = {cmocka_unit_test(sliding_friction_sign),
                                          cmocka_unit_test(wall_bounce),
                                          cmocka_unit_test(bounce_on_a_border),
                                          cmocka_unit_test(head_on), cmocka_unit_test(free_flight)};
-    memcpy(tests + 2 * N_SCENES, closed, sizeof closed);
+    memcpy(tests + 3 * N_SCENES, closed, sizeof closed);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -98,6 +98,9 @@ void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, cons
 void crm_targets_vjp(crm_reverse *r, const crm_substep *s, const double *v, double *v_bar,
                      double *gap_bar, double *h_bar, int with_parameters);
 
+/* Restitution of a contact: e_bar to both bodies. */
+void crm_restitution_vjp(crm_reverse *r, const crm_substep *s, const crm_contact *c, double e_bar);
+
 /* The maps, from (q_bar, v_bar) at the end of a sub-step to its start, in place; parameters go to
  * the sink when with_parameters; *h_bar is the cotangent of h. */
 carom_status crm_euler_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,

@@ -66,8 +66,7 @@ void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, double h, doubl
     }
 }
 
-static void add_restitution(crm_reverse *r, const crm_substep *s, const crm_contact *c,
-                            double e_bar)
+void crm_restitution_vjp(crm_reverse *r, const crm_substep *s, const crm_contact *c, double e_bar)
 {
     const carom_world *w = r->world;
     double *g = r->sink.g.restitution;
@@ -104,7 +103,7 @@ void crm_targets_vjp(crm_reverse *r, const crm_substep *s, const double *v, doub
             r->bars.jn[6 * k + i] += e * cn_bar * v[3 * c->body_a + i];
             r->bars.jn[6 * k + 3 + i] += e * cn_bar * v[3 * c->body_b + i];
         }
-        if (with_parameters) add_restitution(r, s, c, cn_bar * un);
+        if (with_parameters) crm_restitution_vjp(r, s, c, cn_bar * un);
     }
 }
 

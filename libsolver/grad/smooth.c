@@ -143,13 +143,52 @@ static carom_status stage_2_vjp(crm_reverse *r, crm_substep *s, double *q_bar, c
     return CAROM_OK;
 }
 
+/* c_n of a bounce: e J_n v0 where it is negative, gap / h where it is positive. */
+static void bounce_side_vjp(crm_reverse *r, const crm_substep *s, int k, double *v0_bar,
+                            double *h_bar, int with_parameters)
+{
+    const carom_world *w = r->world;
+    const crm_contact *x = &s->moved[k];
+    const double cn = s->solve[1].cn[k];
+    const double cn_bar = r->bars.cn[k];
+    r->gap_bar[k] = cn > 0 ? cn_bar / s->h : 0;
+    if (cn > 0) *h_bar -= cn_bar * cn / s->h;
+    if (cn >= 0) return;
+    const double *jn = &w->rows.jn[6 * k];
+    const double un = crm_row_dot(jn, s->v0, x->body_a, x->body_b);
+    add_row(v0_bar, x->body_a, x->body_b, jn, cn_bar * cn / un);
+    add_outer(&r->bars.jn[6 * k], x->body_a, x->body_b, s->v0, cn_bar * cn / un);
+    if (with_parameters) crm_restitution_vjp(r, s, x, cn_bar * un);
+}
+
+/* v1 from v0 at q1; stage 1 then only counts for the pose. */
+static carom_status bounce_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
+                               int with_parameters, double *h_bar)
+{
+    const crm_solve *c = &s->solve[1];
+    const carom_status e = crm_solve_vjp(r, s, c, v_bar);
+    if (e < 0) return e;
+    crm_zero(r->world, r->solve_bar);
+    crm_zero(r->world, v_bar);
+    crm_free_velocity_vjp(r, s, s->h, 1, v_bar, h_bar, with_parameters);
+    if (with_parameters) crm_mass_vjp(r);
+    for (int k = 0; k < s->n_contacts; k++) bounce_side_vjp(r, s, k, v_bar, h_bar, with_parameters);
+    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar, with_parameters);
+    return CAROM_OK;
+}
+
 carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
                             int with_parameters, double *h_bar)
 {
     *h_bar = 0;
-    carom_status e = stage_2_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+    carom_status e;
+    if (s->solve[1].kind == CRM_BOUNCE) {
+        e = bounce_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+    } else {
+        e = stage_2_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+        crm_zero(r->world, v_bar);
+    }
     crm_move_vjp(r->world, s, s->solve[0].v, q_bar, r->solve_bar, h_bar);
-    crm_zero(r->world, v_bar);
     const double first = largest(r->world, r->solve_bar);
     for (int k = 0; e >= 0 && k < MAX_PASSES; k++) {
         if (largest(r->world, r->solve_bar) <= PASS_TOL * first) return CAROM_OK;

@@ -148,12 +148,14 @@ carom_status crm_detect(carom_world *w, const double *q, double margin)
     return CAROM_OK;
 }
 
-/* How far a point of the body can get within h at velocity v [m]. */
+/* How far a point of the shape may get within h from velocity v: its way and its room [m]. */
 static double travel(const carom_world *w, int shape, const double *v, double h)
 {
     const crm_shape *s = &w->shapes[shape];
     const double *vb = v + 3 * s->body;
-    return h * (hypot(vb[1], vb[2]) + fabs(vb[0]) * s->reach);
+    if (w->bodies[s->body].type == CAROM_STATIC) return 0;
+    const double room = w->islands.slack[s->body] + w->islands.excess[s->body];
+    return h * (hypot(vb[1], vb[2]) + fabs(vb[0]) * s->reach) + room;
 }
 
 carom_status crm_detect_ahead(carom_world *w, const double *q, const double *v, double h,
@@ -161,6 +163,7 @@ carom_status crm_detect_ahead(carom_world *w, const double *q, const double *v, 
 {
     const crm_island *island = w->island;
     w->sub.n_contacts = 0;
+    w->islands.looked_ahead = 1;
     for (int k = 0; k < island->n_pairs; k++) {
         const carom_pair pair = island->pairs[k];
         const double reach = margin + travel(w, pair.a, v, h) + travel(w, pair.b, v, h);

@@ -73,7 +73,8 @@ typedef enum crm_solve_kind {
     CRM_CORRECTION, /* Euler: displacement v from rows at q, frictionless */
     CRM_IMPACT,     /* v1 from v0, no time passes */
     CRM_STAGE_1, /* smooth: velocity over the sub-step, rows at q0, right-hand sides at its end */
-    CRM_STAGE_2  /* smooth: v1 from rows at q1 */
+    CRM_STAGE_2, /* smooth: v1 from rows at q1 */
+    CRM_BOUNCE   /* in place of stage 2: v1 from v0 and all of h, with restitution */
 } crm_solve_kind;
 
 typedef struct crm_solve {
@@ -107,6 +108,7 @@ typedef struct crm_substep {
     unsigned char *pressing; /* per contact: closed by force, so held at gap 0 from both sides */
     double *target;          /* per contact: gap that stage 1 aims at [m] */
     double restitution;      /* factor on all restitutions: 1, or 0 when relaxed */
+    int ahead;               /* 1: contacts are all that may close; impacts are not located */
     int n_solves;
     crm_solve solve[CRM_MAX_SOLVES];
     crm_end end;
@@ -170,10 +172,11 @@ typedef struct crm_islands {
     int *root, *label;     /* per body */
     unsigned char *linked; /* per body: in a pair or joint */
     int *bodies, *joints;
-    double *ahead;  /* 3 n_bodies: the way foreseen for the frame */
-    double *slack;  /* per body: room around it [m] */
-    double *excess; /* per body: more room, after it was left [m] */
-    int escaped;    /* 1: a body left its room */
+    double *ahead;    /* 3 n_bodies: the way foreseen for the frame */
+    double *slack;    /* per body: room around it [m] */
+    double *excess;   /* per body: more room, after it was left [m] */
+    int escaped;      /* 1: a body left its room */
+    int looked_ahead; /* 1: contacts ahead were chosen by the room of the bodies */
     carom_box *boxes;
     int n_pairs, max_found, max_pairs;
     carom_pair *found; /* all that may touch within the frame */

@@ -238,6 +238,7 @@ carom_status crm_islands_find(carom_world *w, double dt)
     int same;
     memset(s->excess, 0, (size_t)w->n_bodies * sizeof *s->excess);
     s->escaped = 0;
+    s->looked_ahead = 0;
     for (int b = 0; b < w->n_bodies; b++) {
         if (w->bodies[b].type != CAROM_STATIC) foresee(w, b, dt);
     }
@@ -250,7 +251,8 @@ carom_status crm_islands_widen(carom_world *w, int *changed)
     int same;
     w->islands.escaped = 0;
     const carom_status e = find_pairs(w, &same);
-    *changed = !same;
+    *changed = !same || w->islands.looked_ahead;
+    w->islands.looked_ahead = 0;
     return e || same ? e : group(w);
 }
 

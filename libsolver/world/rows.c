@@ -202,6 +202,7 @@ carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const cr
     case CRM_IMPACT: crm_free_velocity(w, s, s->v0, 0); break;
     case CRM_STAGE_1: crm_free_velocity(w, s, s->v0, 0.5 * s->h); break;
     case CRM_STAGE_2: crm_free_velocity(w, s, c[-1].v, 0.5 * s->h); break;
+    case CRM_BOUNCE: crm_free_velocity(w, s, s->v0, s->h); break;
     }
     return crm_problem(w, s, c);
 }

@@ -139,14 +139,70 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
     return CAROM_OK;
 }
 
+/* c_n of a contact of sub in a bounce: restitution of an approach at q1 that is faster than rest
+ * and than what gravity does in a sub-step; or gap / h where it is still open. */
+static double bounce_side(const carom_world *w, const crm_substep *s, int k)
+{
+    const crm_contact *c = &s->moved[k];
+    const double g = hypot(w->settings.gravity[0], w->settings.gravity[1]);
+    const double slop = w->settings.margin * w->length;
+    if (c->gap > slop) return c->gap / s->h;
+    const double un = crm_row_dot(&w->rows.jn[6 * k], s->v0, c->body_a, c->body_b);
+    if (un >= -fmax(w->rest_speed, 2 * g * s->h)) return 0;
+    return s->restitution * un *
+           crm_combine(w->settings.combine_restitution, w->restitution[c->body_a],
+                       w->restitution[c->body_b]);
+}
+
+/* Right-hand sides of a bounce, rows at q1 in place; 1 when a contact bounces. */
+static int bounce_sides(const carom_world *w, const crm_substep *s, crm_solve *c)
+{
+    int any = 0;
+    for (int k = 0; k < s->n_contacts; k++) {
+        c->cn[k] = bounce_side(w, s, k);
+        c->ct[k] = 0;
+        c->mode[k] = s->solve[0].mode[k];
+        any |= c->cn[k] < 0;
+    }
+    for (int k = 0; k < 2 * w->island->n_joints; k++) c->ce[k] = 0;
+    return any;
+}
+
+/* Impacts within a sub-step that located none: it has moved as if plastic; its velocities are those
+ * of one impact at its end, v1 = v0 + h (W f + g) + W J1' l.  *done = 0: nothing bounces. */
+static carom_status bounce(carom_world *w, crm_substep *s, int *done)
+{
+    crm_solve *c = &s->solve[1];
+    *done = 0;
+    c->kind = CRM_BOUNCE;
+    crm_copy(w, c->q, s->q1);
+    crm_rows_at(w, s, s->q1);
+    if (!bounce_sides(w, s, c)) return CAROM_OK;
+    crm_free_velocity(w, s, s->v0, s->h);
+    carom_status e = crm_solve_run(w, s, c, 1);
+    if (e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION) {
+        s->restitution = 0;
+        bounce_sides(w, s, c);
+        e = crm_solve_run(w, s, c, 0);
+        if (e >= 0) e = CAROM_RELAXED;
+    }
+    if (e < 0) return e;
+    s->n_solves = 2;
+    crm_copy(w, s->v1, c->v);
+    *done = 1;
+    return e;
+}
+
 carom_status crm_smooth(carom_world *w, double h)
 {
     crm_substep *s = &w->sub;
     s->map = CRM_MAP_SMOOTH;
     s->h = h;
     s->restitution = 1;
-    const carom_status e = stage_1(w, s);
-    return e < 0 ? e : stage_2(w, s);
+    int done = 0;
+    carom_status e = stage_1(w, s);
+    if (e >= 0 && s->ahead) e = bounce(w, s, &done);
+    return e < 0 || done ? e : stage_2(w, s);
 }
 
 carom_status crm_impact(carom_world *w)

@@ -22,6 +22,7 @@ static void begin_substep(carom_world *w)
 static carom_status find_contacts(carom_world *w, double left, int last)
 {
     const double margin = w->settings.margin * w->length;
+    w->sub.ahead = last;
     if (!last) return crm_detect(w, w->q, margin);
     return crm_detect_ahead(w, w->q, w->v, left, margin);
 }
