@@ -137,16 +137,25 @@ static double per_time(const crm_substep *s, int i)
     return s->h > 0 && i < s->n_solves && kind != CRM_CORRECTION ? 1 / s->h : 0;
 }
 
+/* Impulse over the whole sub-step: both stages give one half. */
+static double whole(const crm_substep *s, double first, double second)
+{
+    if (s->map != CRM_MAP_SMOOTH) return first;
+    return s->solve[1].kind == CRM_BOUNCE ? second : first + second;
+}
+
 static crm_touch touch_of(const crm_substep *s, int k)
 {
     const crm_contact *c = &s->contacts[k];
-    crm_touch t = {*c,     {0, 0}, s->solve[0].ln[k],  s->solve[0].lt[k],
-                   {0, 0}, {0, 0}, s->solve[0].mode[k]};
+    const crm_solve *x = s->solve;
+    crm_touch t = {*c, {0, 0}, 0, 0, {0, 0}, {0, 0}, x[0].mode[k]};
     t.point.x = s->q0[3 * c->body_a + 1] + c->arm_a.x;
     t.point.y = s->q0[3 * c->body_a + 2] + c->arm_a.y;
+    t.ln = whole(s, x[0].ln[k], x[1].ln[k]);
+    t.lt = whole(s, x[0].lt[k], x[1].lt[k]);
     for (int i = 0; i < 2; i++) {
-        t.force_n[i] = per_time(s, i) * s->solve[i].ln[k];
-        t.force_t[i] = per_time(s, i) * s->solve[i].lt[k];
+        t.force_n[i] = per_time(s, i) * x[i].ln[k];
+        t.force_t[i] = per_time(s, i) * x[i].lt[k];
     }
     return t;
 }

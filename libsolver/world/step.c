@@ -6,7 +6,7 @@
 /* Time below this fraction of a step is carried into the next one. */
 static const double CARRY_TOL = 1e-13;
 /* Moving bodies times sub-steps of one frame, and sub-steps beyond all counting. */
-enum { BODY_SUBSTEPS = 256, MAX_SUBSTEPS = 256 };
+enum { BODY_SUBSTEPS = 128, MAX_SUBSTEPS = 256 };
 /* How often pairs are looked for again when bodies leave the room foreseen for them. */
 enum { MAX_WIDENINGS = 4 };
 

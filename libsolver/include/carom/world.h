@@ -35,14 +35,14 @@ typedef enum carom_combine {
  * `--set` use these names (carom_world_settings_set). */
 #define CAROM_WORLD_SETTINGS(X)                                                                    \
     X(dt, double, 1.0 / 60, "s", "length of a step")                                               \
-    X(integrator, int, CAROM_EULER, "", "euler, located or fixed")                                        \
+    X(integrator, int, CAROM_LOCATED, "", "euler, located or fixed")                                        \
     X(combine_friction, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")                \
     X(combine_restitution, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")             \
     X(length, double, 0, "m", "length scale L; 0: largest diameter of a dynamic body's shape")     \
     X(margin, double, 1e-6, "L", "gap below which a pair is in contact")                           \
     X(penetration, double, 1e-9, "L", "overlap below which a new contact needs no shorter step")   \
     X(rest_speed, double, 1e-3, "sqrt(g L)", "approach slower than this does not bounce")          \
-    X(max_substeps, int, 32, "1", "sub-steps of an island, at most; 256/bodies in large ones")    \
+    X(max_substeps, int, 32, "1", "sub-steps of an island, at most; 128/bodies in large ones")    \
     X(project_overlap, int, 1, "", "overlap of the initial scene: 1 projected away, 0 refused")    \
     X(accept, double, 1e-10, "1", "residual of a solved contact problem")                          \
     X(inexact, double, 1e-6, "1", "residual of a usable one")
