@@ -30,7 +30,11 @@ typedef struct tally {
     long stuck; /* scenes given up: a step failed twice */
     long status[N_STATUSES];
     double factorizations;
-    record overlap, residual, busiest, substeps, events, drift, growth;
+    long escaped;   /* scenes in which a body went through a wall */
+    record overlap; /* where nothing is driven; a rotor may crush what is between it and a wall */
+    record crushed; /* where something is */
+    record silent;  /* overlap that came in a step without a caveat */
+    record residual, busiest, substeps, events, drift, growth;
 } tally;
 
 static int status_row(carom_status e)
@@ -78,14 +82,19 @@ static carom_status step_or_nothing(random_scene *s, uint64_t seed, carom_step_s
     return e;
 }
 
+/* *overlap: before the step, and then after it. */
 static void note_step(tally *t, const random_scene *s, const carom_step_stats *x, uint64_t seed,
-                      int step)
+                      int step, double *overlap)
 {
     int a, b;
-    const double overlap = random_scene_overlap(s, &a, &b);
+    const double before = *overlap;
+    *overlap = random_scene_overlap(s, &a, &b);
     t->steps++;
     t->factorizations += x->factorizations;
-    note(&t->overlap, overlap, seed, step);
+    note(s->has_kinematic ? &t->crushed : &t->overlap, *overlap, seed, step);
+    if (x->status == CAROM_OK && !s->has_kinematic) {
+        note(&t->silent, *overlap - before, seed, step);
+    }
     note(&t->residual, x->residual, seed, step);
     note(&t->busiest, x->factorizations, seed, step);
     note(&t->substeps, x->n_substeps, seed, step);
@@ -101,6 +110,7 @@ static void run_scene(int integrator, uint64_t seed, tally *t)
     random_scene_make(seed, &set, &s);
     t->scenes++;
     int failed = 0;
+    double overlap = 0;
     for (int k = 0; k < n_steps && failed < 2; k++) {
         carom_step_stats x;
         const double energy = carom_world_energy(s.world);
@@ -115,11 +125,14 @@ static void run_scene(int integrator, uint64_t seed, tally *t)
             }
             continue;
         }
-        note_step(t, &s, &x, seed, k);
+        note_step(t, &s, &x, seed, k, &overlap);
         if (!s.has_kinematic) note(&t->growth, carom_world_energy(s.world) - energy, seed, k);
         if (random_scene_escaped(&s) >= 0) {
-            print_message("%s, seed %llu, step %d: body %d left the room\n", NAMES[integrator],
-                          (unsigned long long)seed, k, random_scene_escaped(&s));
+            t->escaped++;
+            if (verbose) {
+                print_message("%s, seed %llu, step %d: body %d left the room\n", NAMES[integrator],
+                              (unsigned long long)seed, k, random_scene_escaped(&s));
+            }
             break;
         }
     }
@@ -135,13 +148,16 @@ static void print_record(const char *what, const record *r)
 
 static void print_tally(const char *name, const tally *t)
 {
-    print_message("%s: %ld scenes, %ld steps, %ld scenes given up; %.2f factorizations per step\n",
-                  name, t->scenes, t->steps, t->stuck, t->factorizations / (double)t->steps);
+    print_message(
+        "%s: %ld scenes, %ld steps, %ld scenes given up, %ld left; %.1f factorizations per step\n",
+        name, t->scenes, t->steps, t->stuck, t->escaped, t->factorizations / (double)t->steps);
 #define PRINT_STATUS(id, value, text)                                                              \
     if (t->status[status_row(id)]) print_message("  %-28s %10ld\n", #id, t->status[status_row(id)]);
     CAROM_STATUS_TABLE(PRINT_STATUS)
 #undef PRINT_STATUS
     print_record("overlap [m]", &t->overlap);
+    print_record("overlap, driven scenes [m]", &t->crushed);
+    print_record("overlap without a caveat [m]", &t->silent);
     print_record("residual", &t->residual);
     print_record("factorizations in a step", &t->busiest);
     print_record("sub-steps in a step", &t->substeps);

@@ -11,6 +11,8 @@ static const double PI = 3.14159265358979323846;
 static const double CELL = 1;
 /* Walls reach this high where there is no lid: 2 s at 100 m/s, and some more [m]. */
 static const double WALL = 300;
+/* A center that far inside a wall has gone through its face [m]. */
+static const double THROUGH = 0.5;
 
 /* The draw under way. */
 typedef struct draw {
@@ -251,7 +253,7 @@ static void add_stack(draw *d, int n, double x)
 
 static carom_body_type random_type(rng *r)
 {
-    return chance(r, 0.04) ? CAROM_STATIC : chance(r, 0.03) ? CAROM_KINEMATIC : CAROM_DYNAMIC;
+    return chance(r, 0.04) ? CAROM_STATIC : chance(r, 0.01) ? CAROM_KINEMATIC : CAROM_DYNAMIC;
 }
 
 /* The cells of a room n_columns wide, from the floor up; column 0 is left to a stack. */
@@ -337,7 +339,8 @@ int random_scene_escaped(const random_scene *s)
         const double x = q[3 * b + 1];
         const double y = q[3 * b + 2];
         if (s->type[b] != CAROM_DYNAMIC) continue;
-        if (!(fabs(x) <= s->half_width && y >= 0 && y <= s->height)) return b;
+        const double out = fmax(fmax(fabs(x) - s->half_width, -y), y - s->height);
+        if (!(out <= THROUGH)) return b;
     }
     return -1;
 }

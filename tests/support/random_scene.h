@@ -42,7 +42,7 @@ void random_scene_make(uint64_t seed, const carom_world_settings *settings, rand
 
 /* Largest overlap of two bodies that collide, at the world's state; *a and *b are those [m]. */
 double random_scene_overlap(const random_scene *s, int *a, int *b);
-/* A dynamic body whose center has left the room, -1: none. */
+/* A dynamic body whose center is half a meter or more outside the room, -1: none. */
 int random_scene_escaped(const random_scene *s);
 
 #endif
