@@ -1,4 +1,4 @@
-/* geometry.c: reverse derivatives of Jacobian rows, gaps and joint errors. */
+/* geometry.c: reverse derivatives of the rows, gaps and slips of contacts. */
 #include "grad/internal.h"
 
 #include <math.h>
@@ -57,43 +57,6 @@ void crm_geometry_vjp(crm_reverse *r, const double *q, const crm_contact *c,
     }
 }
 
-/* Of x = p + R(angle) local: the arm's cotangent to angle and local. */
-static void arm_vjp(double angle, carom_vec2 local, carom_vec2 arm_bar, double *angle_bar,
-                    carom_vec2 *local_bar)
-{
-    const double c = cos(angle);
-    const double s = sin(angle);
-    const carom_vec2 arm = {c * local.x - s * local.y, s * local.x + c * local.y};
-    *angle_bar += arm.x * arm_bar.y - arm.y * arm_bar.x;
-    if (!local_bar) return;
-    local_bar->x += c * arm_bar.x + s * arm_bar.y;
-    local_bar->y += -s * arm_bar.x + c * arm_bar.y;
-}
-
-void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double je_bar[12],
-                   const double *error_bar, double *q_bar, int with_parameters)
-{
-    const crm_joint *j = &r->world->joints[joint];
-    carom_vec2 *anchors = with_parameters ? r->sink.g.anchors : NULL;
-    const double *g = je_bar;
-    carom_vec2 a_bar = {g[6], -g[0]};
-    carom_vec2 b_bar = {-g[9], g[3]};
-    if (error_bar) {
-        a_bar.x += error_bar[0];
-        a_bar.y += error_bar[1];
-        b_bar.x -= error_bar[0];
-        b_bar.y -= error_bar[1];
-        q_bar[3 * j->body_a + 1] += error_bar[0];
-        q_bar[3 * j->body_a + 2] += error_bar[1];
-        q_bar[3 * j->body_b + 1] -= error_bar[0];
-        q_bar[3 * j->body_b + 2] -= error_bar[1];
-    }
-    arm_vjp(q[3 * j->body_a], j->local_a, a_bar, &q_bar[3 * j->body_a],
-            anchors ? &anchors[2 * joint] : NULL);
-    arm_vjp(q[3 * j->body_b], j->local_b, b_bar, &q_bar[3 * j->body_b],
-            anchors ? &anchors[2 * joint + 1] : NULL);
-}
-
 static void add_vertex(crm_reverse *r, int shape, int vertex, double x, double y)
 {
     carom_vec2 *g = r->sink.g.vertices;
@@ -117,7 +80,7 @@ static void slide_point_vjp(const crm_slide *s, const double *q, carom_vec2 y_ba
     q_bar[3 * s->face_body + 2] -= x_bar.y;
     q_bar[3 * s->point_body + 1] += x_bar.x;
     q_bar[3 * s->point_body + 2] += x_bar.y;
-    arm_vjp(q[3 * s->point_body], s->v, x_bar, &q_bar[3 * s->point_body], v_bar);
+    crm_arm_vjp(q[3 * s->point_body], s->v, x_bar, &q_bar[3 * s->point_body], v_bar);
 }
 
 /* slip = t . (y1 - y0) - r (turn of i - turn of k), t = (b - a) / |b - a|. */
@@ -170,8 +133,8 @@ static void angle_vjp(crm_reverse *r, const crm_contact *c, const double *q, dou
     q_bar[3 * c->body_a + 2] += a_bar.y;
     q_bar[3 * c->body_b + 1] += b_bar.x;
     q_bar[3 * c->body_b + 2] += b_bar.y;
-    arm_vjp(q[3 * c->body_a], va, a_bar, &q_bar[3 * c->body_a], &va_bar);
-    arm_vjp(q[3 * c->body_b], vb, b_bar, &q_bar[3 * c->body_b], &vb_bar);
+    crm_arm_vjp(q[3 * c->body_a], va, a_bar, &q_bar[3 * c->body_a], &va_bar);
+    crm_arm_vjp(q[3 * c->body_b], vb, b_bar, &q_bar[3 * c->body_b], &vb_bar);
     if (!with_parameters) return;
     add_vertex(r, c->shape_a, c->recipe.ref, va_bar.x, va_bar.y);
     add_vertex(r, c->shape_b, c->recipe.inc, vb_bar.x, vb_bar.y);

@@ -24,7 +24,7 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
 {
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
     const size_t k3 = 3 * (size_t)r->world->n_moving;
-    const size_t rows = 2 * (size_t)r->world->n_joints;
+    const size_t rows = (size_t)r->world->n_joint_rows;
     crm_substep *s = &r->work;
     double **const full[] = {&r->q_bar,     &r->v_bar, &r->q_seed,   &r->v_seed,  &r->q_event,
                              &r->solve_bar, &r->pose,  &r->pose_bar, &r->q_after, &r->v_after,
@@ -89,6 +89,9 @@ static void clear_sink(const crm_reverse *r)
     clear(g->radius, (size_t)w->n_shapes);
     clear((double *)g->vertices, 2 * (size_t)w->n_vertices);
     clear((double *)g->anchors, 4 * (size_t)w->n_joints);
+    clear(g->axes, (size_t)w->n_joints);
+    clear(g->angles, (size_t)w->n_joints);
+    clear(g->lengths, (size_t)w->n_joints);
 }
 
 static void drop_negligible(const carom_world *w, double *x, double scale)

@@ -71,13 +71,25 @@ void crm_contact_rows_vjp(const crm_contact *c, const double jn_bar[6], const do
                           carom_contact_bar *bar);
 void crm_geometry_vjp(crm_reverse *r, const double *q, const crm_contact *c,
                       const carom_contact_bar *bar, double *q_bar, int with_parameters);
-void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double je_bar[12],
-                   const double *error_bar, double *q_bar, int with_parameters);
-
 void crm_slip_vjp(crm_reverse *r, const crm_contact *c, const double *q0, const double *q1,
                   double slip_bar, double *q0_bar, double *q1_bar, int with_parameters);
 
-/* solve.c: the adjoint of one solve. */
+/* joint.c: each adds. */
+/* Of x = p + R(angle) local: the arm's cotangent to angle and local (may be NULL). */
+void crm_arm_vjp(double angle, carom_vec2 local, carom_vec2 arm_bar, double *angle_bar,
+                 carom_vec2 *local_bar);
+typedef struct crm_joint_bar {
+    carom_vec2 anchor[2];
+    double axis, angle, length;
+} crm_joint_bar;
+/* Of a measure and its row (may be NULL) at q. */
+void crm_measure_vjp(const crm_joint *j, crm_measure m, const double *q, const double row_bar[6],
+                     double value_bar, double *q_bar, crm_joint_bar *bar);
+/* Of a joint's rows (6 numbers each) and errors, each may be NULL. */
+void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double *je_bar,
+                   const double *error_bar, double *q_bar, int with_parameters);
+
+/* reverse.c: the adjoint of one solve. */
 /* Reverse derivative of solve c with the cotangent v_bar of its velocity: fills r->bars.  Masses go
  * to the sink with with_parameters, except what u depends on them. */
 carom_status crm_solve_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, const double *v_bar);

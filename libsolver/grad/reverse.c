@@ -130,9 +130,12 @@ void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, cons
         crm_geometry_vjp(r, c->q, &s->moved[k], &bar, q_bar, with_parameters);
         if (with_parameters && rough) add_friction(r, &s->moved[k], r->bars.mu[k]);
     }
+    int row = 0;
     for (int k = 0; k < r->world->island->n_joints; k++) {
-        crm_joint_vjp(r, c->q, r->world->island->joints[k], &r->bars.je[12 * k],
-                      error_bar ? &error_bar[2 * k] : NULL, q_bar, with_parameters);
+        const int joint = r->world->island->joints[k];
+        crm_joint_vjp(r, c->q, joint, &r->bars.je[6 * row], error_bar ? &error_bar[row] : NULL,
+                      q_bar, with_parameters);
+        row += r->world->joints[joint].n_rows;
     }
 }
 

@@ -56,27 +56,26 @@ static void contact_side_vjp(crm_reverse *r, const crm_substep *s, int k, const 
     crm_slip_vjp(r, &x, s->q0, p, ct_bar / s->h, q0_bar, r->pose_bar, with_parameters);
 }
 
-/* c_e = error(p) / h - J_e v of one joint. */
-static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int k, const double *v,
-                           const double *p, double *v_bar, double *h_bar, int with_parameters)
+/* c_e = error(p) / h - J_e v of one joint, whose first row in the island is `first`. */
+static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int first,
+                           const double *v, const double *p, double *v_bar, double *h_bar,
+                           int with_parameters)
 {
     const carom_world *w = r->world;
-    const int joint = w->island->joints[k];
     const crm_joint *j = &w->joints[joint];
-    static const double none[12] = {0};
-    double je[12];
-    double error[2];
-    double error_bar[2];
+    double je[6 * CRM_MAX_JOINT_ROWS];
+    double error[CRM_MAX_JOINT_ROWS];
+    double error_bar[CRM_MAX_JOINT_ROWS];
     crm_joint_rows(j, p, je, error);
-    for (int i = 0; i < 2; i++) {
-        const int row = 2 * k + i;
+    for (int i = 0; i < j->n_rows; i++) {
+        const int row = first + i;
         const double ce_bar = r->bars.ce[row];
         add_row(v_bar, j->body_a, j->body_b, &w->rows.je[6 * row], -ce_bar);
         add_outer(&r->bars.je[6 * row], j->body_a, j->body_b, v, -ce_bar);
         error_bar[i] = ce_bar / s->h;
         *h_bar -= ce_bar * error[i] / (s->h * s->h);
     }
-    crm_joint_vjp(r, p, joint, none, error_bar, r->pose_bar, with_parameters);
+    crm_joint_vjp(r, p, joint, NULL, error_bar, r->pose_bar, with_parameters);
 }
 
 /* Right-hand sides from the velocity v of the fixed point, which ends at p = q0 + h v. */
@@ -92,8 +91,11 @@ static void sides_vjp(crm_reverse *r, const crm_substep *s, const double *v, dou
         r->gap_bar[k] = 0;
         contact_side_vjp(r, s, k, v, p, v_bar, q0_bar, h_bar, with_parameters);
     }
+    int row = 0;
     for (int k = 0; k < w->island->n_joints; k++) {
-        joint_side_vjp(r, s, k, v, p, v_bar, h_bar, with_parameters);
+        const int joint = w->island->joints[k];
+        joint_side_vjp(r, s, joint, row, v, p, v_bar, h_bar, with_parameters);
+        row += w->joints[joint].n_rows;
     }
     crm_move_vjp(w, s, v, r->pose_bar, v_bar, h_bar);
     for (int k = 0; k < 3 * w->n_bodies; k++) q0_bar[k] += r->pose_bar[k];

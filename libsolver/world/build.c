@@ -1,4 +1,4 @@
-/* build.c: adding bodies and joints, and the parameters that may change later. */
+/* build.c: adding bodies, and the parameters that may change later. */
 #include "world/block.h"
 #include "world/internal.h"
 
@@ -204,56 +204,6 @@ carom_status carom_world_add_body(carom_world *world, const carom_body_def *def,
     if (e) return e;
     if (index) *index = w->n_bodies;
     add_body(w, def);
-    return CAROM_OK;
-}
-
-/* R(angle)' (point - position) */
-static carom_vec2 to_local(carom_pose p, carom_vec2 point)
-{
-    const double c = cos(p.angle);
-    const double s = sin(p.angle);
-    const double x = point.x - p.x;
-    const double y = point.y - p.y;
-    const carom_vec2 local = {c * x + s * y, -s * x + c * y};
-    return local;
-}
-
-static carom_status check_joint(carom_world *w, int a, int b, carom_vec2 anchor)
-{
-    const int id = w->n_joints;
-    if (w->sealed) {
-        return crm_world_fail(w, CAROM_E_STATE, "joints are added before the world is sealed");
-    }
-    if (a < 0 || a >= w->n_bodies || b < 0 || b >= w->n_bodies) {
-        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: there is no body %d", id,
-                              a < 0 || a >= w->n_bodies ? a : b);
-    }
-    if (a == b) return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: one body twice", id);
-    if (w->bodies[a].type != CAROM_DYNAMIC && w->bodies[b].type != CAROM_DYNAMIC) {
-        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: neither body %d nor %d is dynamic",
-                              id, a, b);
-    }
-    if (!isfinite(anchor.x) || !isfinite(anchor.y)) {
-        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: anchor not finite", id);
-    }
-    return CAROM_OK;
-}
-
-carom_status carom_world_add_revolute(carom_world *world, int body_a, int body_b, carom_vec2 anchor,
-                                      int *index)
-{
-    if (!world) return CAROM_E_ARGUMENT;
-    carom_world *w = world;
-    carom_status e = check_joint(w, body_a, body_b, anchor);
-    if (e) return e;
-    void *joints = w->joints;
-    e = crm_reserve(&w->memory, &joints, &w->max_joints, w->n_joints + 1, sizeof *w->joints);
-    w->joints = joints;
-    if (e) return crm_world_fail(w, e, "no memory for joint %d", w->n_joints);
-    const crm_joint j = {body_a, body_b, to_local(crm_pose(w->q, body_a), anchor),
-                         to_local(crm_pose(w->q, body_b), anchor)};
-    if (index) *index = w->n_joints;
-    w->joints[w->n_joints++] = j;
     return CAROM_OK;
 }
 

@@ -22,17 +22,19 @@ static int compare_keys(const void *x, const void *y)
 
 static int joined(const carom_world *w, int a, int b)
 {
-    if (!w->n_joints) return 0;
+    if (!w->n_joined) return 0;
     const long key = body_key(w, a, b);
-    return bsearch(&key, w->joined, (size_t)w->n_joints, sizeof key, compare_keys) != NULL;
+    return bsearch(&key, w->joined, (size_t)w->n_joined, sizeof key, compare_keys) != NULL;
 }
 
 void crm_sort_joined(carom_world *w)
 {
+    w->n_joined = 0;
     for (int k = 0; k < w->n_joints; k++) {
-        w->joined[k] = body_key(w, w->joints[k].body_a, w->joints[k].body_b);
+        const crm_joint *j = &w->joints[k];
+        if (!j->collide) w->joined[w->n_joined++] = body_key(w, j->body_a, j->body_b);
     }
-    qsort(w->joined, (size_t)w->n_joints, sizeof *w->joined, compare_keys);
+    qsort(w->joined, (size_t)w->n_joined, sizeof *w->joined, compare_keys);
 }
 
 int crm_may_meet(const carom_world *w, int body_a, int body_b)

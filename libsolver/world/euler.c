@@ -48,7 +48,7 @@ static void withdraw(carom_world *w, const crm_substep *s)
     for (int k = 0; k < s->n_contacts; k++) {
         if (s->pressing[k]) add_row(r->u, &r->contact_body[2 * k], &r->jn[6 * k], -s->h * c->ln[k]);
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++) {
+    for (int k = 0; k < w->island->n_rows; k++) {
         add_row(r->u, &r->joint_body[2 * k], &r->je[6 * k], -s->h * c->le[k]);
     }
     for (int k = 0; k < 3 * w->island->n_bodies; k++) r->u[k] *= r->inv_mass[k];
@@ -62,7 +62,7 @@ static double violation(const carom_world *w, const crm_substep *s)
         const double gap = s->moved[k].gap;
         largest = fmax(largest, s->pressing[k] ? fabs(gap) : -gap);
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++)
+    for (int k = 0; k < w->island->n_rows; k++)
         largest = fmax(largest, fabs(w->rows.error[k]));
     return largest;
 }
@@ -73,7 +73,7 @@ static void set_sides(const carom_world *w, const crm_substep *s, crm_solve *c)
         c->cn[k] = s->moved[k].gap;
         c->ct[k] = 0;
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++) c->ce[k] = w->rows.error[k];
+    for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = w->rows.error[k];
 }
 
 /* One correction at c->q, rows in place: displacement, modes, and the multipliers added. */
@@ -89,7 +89,7 @@ static carom_status correct(carom_world *w, crm_substep *s, crm_solve *c)
     for (int k = 0; k < s->n_contacts; k++) {
         if (s->pressing[k]) c->ln[k] -= s->h * step->ln[k];
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++) c->le[k] -= s->h * step->le[k];
+    for (int k = 0; k < w->island->n_rows; k++) c->le[k] -= s->h * step->le[k];
     return CAROM_OK;
 }
 
@@ -98,7 +98,7 @@ static carom_status correct(carom_world *w, crm_substep *s, crm_solve *c)
 static void correct_nothing(const carom_world *w, const crm_substep *s, crm_solve *c)
 {
     crm_zero(w, c->v);
-    for (int k = 0; k < 2 * w->island->n_joints; k++) c->le[k] = 0;
+    for (int k = 0; k < w->island->n_rows; k++) c->le[k] = 0;
     for (int k = 0; k < s->n_contacts; k++) {
         c->ln[k] = 0;
         c->lt[k] = 0;

@@ -36,13 +36,32 @@ typedef struct crm_shape {
     double thickness; /* smallest width over the edge normals [m]; set by seal */
 } crm_shape;
 
-/* A revolute joint: anchors in the frames of its bodies. */
+/* Anchors and axis are in the frames of the bodies. */
 typedef struct crm_joint {
+    carom_joint_kind kind;
     int body_a;
     int body_b;
     carom_vec2 local_a;
     carom_vec2 local_b;
+    double axis;   /* direction in the frame of A [rad] */
+    double angle;  /* held turn of B against A [rad] */
+    double length; /* held distance [m] */
+    double lever;  /* makes an angle a length: L [m]; set by seal */
+    int collide;
+    int first_row; /* among the rows of all joints */
+    int n_rows;
 } crm_joint;
+
+/* What a row of a joint measures, with d from the anchor of A to that of B. */
+typedef enum crm_measure {
+    CRM_ACROSS_X, /* d . (1, 0) */
+    CRM_ACROSS_Y, /* d . (0, 1) */
+    CRM_ALONG,    /* d . axis, the axis turning with A */
+    CRM_ASIDE,    /* d . perp(axis) */
+    CRM_APART,    /* |d| - length */
+    CRM_TURN      /* lever (angle of B - angle of A - angle) */
+} crm_measure;
+enum { CRM_MAX_JOINT_ROWS = 3 };
 
 /* A contact point between two shapes at the pose where it was evaluated. */
 typedef struct crm_contact {
@@ -161,6 +180,7 @@ typedef struct crm_island {
     int *bodies;
     int n_joints;
     int *joints;
+    int n_rows; /* of the joints */
     int n_pairs;
     carom_pair *pairs; /* shapes; also with static bodies */
     int clock;         /* the body whose owed time the frame takes over */
@@ -209,6 +229,7 @@ struct carom_world {
     int n_vertices, max_vertices;
     carom_vec2 *vertices;
     int n_joints, max_joints;
+    int n_joint_rows;
     crm_joint *joints;
     int n_excluded, max_excluded;
     carom_pair *excluded; /* bodies, a < b, sorted */
@@ -223,7 +244,8 @@ struct carom_world {
     void *seal_block;  /* the arrays made by seal */
     size_t seal_bytes;
     double *step_force; /* 3 n_bodies: of the present step, constant + given */
-    long *joined;       /* sorted keys of joined body pairs */
+    int n_joined;
+    long *joined; /* sorted keys of body pairs joined so that they do not collide */
     carom_broadphase *broadphase;
     carom_contact_solver *solver;
     crm_rows rows;
@@ -338,8 +360,6 @@ double crm_combine_slope(int rule, double a, double b);
 double crm_row_dot(const double row[6], const double *v, int body_a, int body_b);
 /* Rows of J_n and J_t, equations.md (2), world bodies as columns. */
 void crm_contact_rows(const crm_contact *c, double jn[6], double jt[6]);
-/* Rows of J_e (2 x 6), equations.md (1), and the position error [m]. */
-void crm_joint_rows(const crm_joint *j, const double *q, double je[12], double error[2]);
 /* Rows of all contacts and joints at q into w->rows, joint errors, inverse masses; sub.moved. */
 void crm_rows_at(carom_world *w, crm_substep *s, const double *q);
 /* W f + g of a body at the forces of this step. */
@@ -353,6 +373,22 @@ carom_contact_problem crm_problem(carom_world *w, const crm_substep *s, const cr
 void crm_velocity_targets(carom_world *w, const crm_substep *s, const double *v, crm_solve *c);
 /* w->rows and rows.u of a solve of this sub-step, from recorded states alone. */
 carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const crm_solve *c);
+
+/* joint.c */
+/* Number of rows of a kind of joint, and what its rows measure. */
+int crm_joint_measures(carom_joint_kind kind, const crm_measure **measures);
+/* Lever arms of the anchors and the way d from one to the other, in the world. */
+typedef struct crm_joint_frame {
+    carom_vec2 arm_a, arm_b, d;
+} crm_joint_frame;
+crm_joint_frame crm_joint_frame_at(const crm_joint *j, const double *q);
+/* Unit vector along which the measure sees d; 0 for a turn. */
+carom_vec2 crm_measure_direction(const crm_joint *j, crm_measure m, const double *q,
+                                 const crm_joint_frame *f);
+/* The measure at q [m], and its row: the derivative by (q_a, q_b). */
+double crm_measure_at(const crm_joint *j, crm_measure m, const double *q, double row[6]);
+/* Rows of J_e (6 each) and position errors [m] of a joint. */
+void crm_joint_rows(const crm_joint *j, const double *q, double *je, double *error);
 /* Largest joint error at q [m]. */
 double crm_joint_drift(const carom_world *w, const double *q);
 

@@ -192,7 +192,7 @@ static void fill_islands(carom_world *w)
         crm_island *i = &s->list[k];
         i->bodies = s->bodies + bodies;
         i->joints = s->joints + joints;
-        i->pairs = s->pairs + pairs;
+        i->pairs = s->pairs ? s->pairs + pairs : NULL;
         bodies += i->n_bodies;
         joints += i->n_joints;
         pairs += i->n_pairs;
@@ -206,6 +206,7 @@ static void fill_islands(carom_world *w)
     for (int k = 0; k < w->n_joints; k++) {
         crm_island *i = &s->list[s->label[joint_body(w, k)]];
         i->joints[i->n_joints++] = k;
+        i->n_rows += w->joints[k].n_rows;
     }
     for (int k = 0; k < s->n_pairs; k++) {
         crm_island *i = &s->list[s->label[pair_body(w, s->found[k])]];

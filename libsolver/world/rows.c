@@ -49,18 +49,6 @@ void crm_contact_rows(const crm_contact *c, double jn[6], double jt[6])
     direction_row(c->arm_a, c->arm_b, t, jt);
 }
 
-void crm_joint_rows(const crm_joint *j, const double *q, double je[12], double error[2])
-{
-    const carom_pose a = crm_pose(q, j->body_a);
-    const carom_pose b = crm_pose(q, j->body_b);
-    const carom_vec2 ra = crm_rotate(a.angle, j->local_a);
-    const carom_vec2 rb = crm_rotate(b.angle, j->local_b);
-    const double rows[12] = {-ra.y, 1, 0, rb.y, -1, 0, ra.x, 0, 1, -rb.x, 0, -1};
-    memcpy(je, rows, sizeof rows);
-    error[0] = (a.x - b.x) + (ra.x - rb.x);
-    error[1] = (a.y - b.y) + (ra.y - rb.y);
-}
-
 /* A pair of sharp vertices has no tangent that slips: no friction in smooth motion. */
 static int sharp(const carom_world *w, const crm_contact *c)
 {
@@ -85,26 +73,15 @@ static void fill_contacts(carom_world *w, const crm_substep *s)
 static void fill_joints(carom_world *w, const double *q)
 {
     crm_rows *r = &w->rows;
+    int row = 0;
     for (int k = 0; k < w->island->n_joints; k++) {
         const crm_joint *j = &w->joints[w->island->joints[k]];
-        crm_joint_rows(j, q, &r->je[12 * k], &r->error[2 * k]);
-        for (int i = 2 * k; i < 2 * k + 2; i++) {
-            r->joint_body[2 * i] = crm_unknown(w, j->body_a);
-            r->joint_body[2 * i + 1] = crm_unknown(w, j->body_b);
+        crm_joint_rows(j, q, &r->je[6 * row], &r->error[row]);
+        for (int i = 0; i < j->n_rows; i++, row++) {
+            r->joint_body[2 * row] = crm_unknown(w, j->body_a);
+            r->joint_body[2 * row + 1] = crm_unknown(w, j->body_b);
         }
     }
-}
-
-double crm_joint_drift(const carom_world *w, const double *q)
-{
-    double largest = 0;
-    for (int k = 0; k < w->n_joints; k++) {
-        double je[12];
-        double e[2];
-        crm_joint_rows(&w->joints[k], q, je, e);
-        largest = fmax(largest, hypot(e[0], e[1]));
-    }
-    return largest;
 }
 
 static void fill_inverse_masses(carom_world *w)
@@ -158,7 +135,7 @@ carom_contact_problem crm_problem(carom_world *w, const crm_substep *s, const cr
     carom_contact_problem p = {0};
     p.n_bodies = w->island->n_bodies;
     p.n_contacts = s->n_contacts;
-    p.n_joint_rows = 2 * w->island->n_joints;
+    p.n_joint_rows = w->island->n_rows;
     p.inv_mass = r->inv_mass;
     p.u = r->u;
     p.contact_body = r->contact_body;
@@ -188,7 +165,7 @@ void crm_velocity_targets(carom_world *w, const crm_substep *s, const double *v,
             c->cn[k] = s->restitution * e * un;
         }
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++) c->ce[k] = 0;
+    for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
 }
 
 carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const crm_solve *c)

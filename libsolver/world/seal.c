@@ -62,6 +62,7 @@ static void set_scales(carom_world *w)
     }
     if (w->settings.length > 0) length = w->settings.length;
     w->length = length > 0 ? length : 1;
+    for (int k = 0; k < w->n_joints; k++) w->joints[k].lever = w->length;
     const double g = hypot(w->settings.gravity[0], w->settings.gravity[1]);
     w->speed = sqrt(g * w->length);
     w->rest_speed = w->settings.rest_speed * w->speed;
@@ -86,7 +87,7 @@ static void lay_world(carom_world *w, crm_block *b)
     w->carry = crm_carve(b, (size_t)w->n_bodies, sizeof(double));
     w->carry_saved = crm_carve(b, (size_t)w->n_bodies, sizeof(double));
     for (int k = 0; k < 2; k++) {
-        w->joint_force[k] = crm_carve(b, 2 * (size_t)w->n_joints, sizeof(double));
+        w->joint_force[k] = crm_carve(b, (size_t)w->n_joint_rows, sizeof(double));
     }
     w->owes = crm_carve(b, (size_t)w->n_bodies, 1);
     w->owes_saved = crm_carve(b, (size_t)w->n_bodies, 1);

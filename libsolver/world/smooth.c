@@ -29,13 +29,24 @@ static void first_sides(const carom_world *w, const crm_substep *s, crm_solve *c
         c->cn[k] = (s->contacts[k].gap - s->target[k]) / s->h;
         c->ct[k] = 0;
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++) c->ce[k] = w->rows.error[k] / s->h;
+    for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = w->rows.error[k] / s->h;
 }
 
-static double joint_row_dot(const carom_world *w, int row, const double *v)
+/* Right-hand sides of joint j in the next iteration; `first` is its first row in the island. */
+static double next_joint_sides(const carom_world *w, const crm_substep *s, const crm_joint *j,
+                               int first, const crm_solve *c, crm_solve *next)
 {
-    const crm_joint *j = &w->joints[w->island->joints[row / 2]];
-    return crm_row_dot(&w->rows.je[6 * row], v, j->body_a, j->body_b);
+    double largest = 0;
+    double je[6 * CRM_MAX_JOINT_ROWS];
+    double error[CRM_MAX_JOINT_ROWS];
+    crm_joint_rows(j, s->q1, je, error);
+    for (int k = 0; k < j->n_rows; k++) {
+        const int row = first + k;
+        const double u = crm_row_dot(&w->rows.je[6 * row], c->v, j->body_a, j->body_b);
+        next->ce[row] = error[k] / s->h - u;
+        largest = fmax(largest, s->h * fabs(next->ce[row] - c->ce[row]));
+    }
+    return largest;
 }
 
 /* Right-hand sides of the next iteration from the end pose of this one: the true gap, slip and
@@ -62,14 +73,11 @@ static double next_sides(const carom_world *w, const crm_substep *s, const crm_s
             largest = fmax(largest, s->h * fabs(next->ct[k] - c->ct[k]));
         }
     }
+    int row = 0;
     for (int k = 0; k < w->island->n_joints; k++) {
-        double je[12];
-        double error[2];
-        crm_joint_rows(&w->joints[w->island->joints[k]], s->q1, je, error);
-        for (int i = 2 * k; i < 2 * k + 2; i++) {
-            next->ce[i] = error[i % 2] / s->h - joint_row_dot(w, i, c->v);
-            largest = fmax(largest, s->h * fabs(next->ce[i] - c->ce[i]));
-        }
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        largest = fmax(largest, next_joint_sides(w, s, j, row, c, next));
+        row += j->n_rows;
     }
     return largest;
 }
@@ -87,7 +95,7 @@ static void take_sides(const carom_world *w, const crm_substep *s, const crm_sol
         to->cn[k] = from->cn[k];
         to->ct[k] = from->ct[k];
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++) to->ce[k] = from->ce[k];
+    for (int k = 0; k < w->island->n_rows; k++) to->ce[k] = from->ce[k];
 }
 
 /* Stage 1: M vh = M v0 + h/2 f + J0' l with gaps, slips and joints met at q1 = q0 + h vh. */
@@ -131,7 +139,7 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
         c->ct[k] = 0;
         c->mode[k] = last->mode[k];
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++) c->ce[k] = 0;
+    for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
     const carom_status e = crm_solve_run(w, s, c, 1);
     if (e < 0) return e;
     s->n_solves = 2;
@@ -164,7 +172,7 @@ static int bounce_sides(const carom_world *w, const crm_substep *s, crm_solve *c
         c->mode[k] = s->solve[0].mode[k];
         any |= c->cn[k] < 0;
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++) c->ce[k] = 0;
+    for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
     return any;
 }
 

@@ -100,8 +100,9 @@ static int find_pair(int n, const crm_touch *t, const crm_contact *c)
 static const crm_touch *recall(const carom_world *w, const crm_contact *c)
 {
     const int again = w->n_substeps > 0;
-    const crm_touch *t = again ? w->next.list + w->first_touch : w->touches.list;
     const int n = again ? w->next.n - w->first_touch : w->touches.n;
+    if (!n) return NULL;
+    const crm_touch *t = again ? w->next.list + w->first_touch : w->touches.list;
     for (int i = find_pair(n, t, c);
          i < n && t[i].contact.shape_a == c->shape_a && t[i].contact.shape_b == c->shape_b; i++) {
         if (crm_recipe_same(t[i].contact.recipe, c->recipe)) return &t[i];
@@ -124,9 +125,12 @@ void crm_guess_load(carom_world *w, double h)
             s->solve[i].lt[k] = h * t->force_t[i];
         }
     }
-    for (int k = 0; k < 2 * w->island->n_joints; k++) {
-        const int row = 2 * w->island->joints[k / 2] + k % 2;
-        for (int i = 0; i < 2; i++) s->solve[i].le[k] = h * w->joint_force[i][row];
+    int row = 0;
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        for (int r = j->first_row; r < j->first_row + j->n_rows; r++, row++) {
+            for (int i = 0; i < 2; i++) s->solve[i].le[row] = h * w->joint_force[i][r];
+        }
     }
 }
 
@@ -168,6 +172,18 @@ static carom_status reserve_touches(carom_world *w, crm_touches *t, int n)
     return e;
 }
 
+static void save_joint_forces(carom_world *w)
+{
+    const crm_substep *s = &w->sub;
+    int row = 0;
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        for (int r = j->first_row; r < j->first_row + j->n_rows; r++, row++) {
+            for (int i = 0; i < 2; i++) w->joint_force[i][r] = per_time(s, i) * s->solve[i].le[row];
+        }
+    }
+}
+
 carom_status crm_touches_save(carom_world *w)
 {
     const crm_substep *s = &w->sub;
@@ -178,16 +194,13 @@ carom_status crm_touches_save(carom_world *w)
     if (e) return e;
     t->n = w->first_touch + s->n_contacts;
     for (int k = 0; k < s->n_contacts; k++) t->list[w->first_touch + k] = touch_of(s, k);
-    for (int k = 0; k < 2 * w->island->n_joints; k++) {
-        const int row = 2 * w->island->joints[k / 2] + k % 2;
-        for (int i = 0; i < 2; i++) w->joint_force[i][row] = per_time(s, i) * s->solve[i].le[k];
-    }
+    save_joint_forces(w);
     return CAROM_OK;
 }
 
 void crm_forget_guesses(carom_world *w)
 {
-    const size_t bytes = 2 * (size_t)w->n_joints * sizeof(double);
+    const size_t bytes = (size_t)w->n_joint_rows * sizeof(double);
     w->touches.n = 0;
     for (int i = 0; i < 2 && w->joint_force[i]; i++) memset(w->joint_force[i], 0, bytes);
 }

@@ -26,7 +26,7 @@ static void lay_states(const carom_world *w, int n, crm_block *b, void *object)
     crm_substep none = {0};
     crm_substep *s = object ? object : &none;
     const size_t n3 = 3 * (size_t)w->n_bodies;
-    const size_t rows = 2 * (size_t)w->n_joints;
+    const size_t rows = (size_t)w->n_joint_rows;
     s->q0 = crm_carve(b, n3, sizeof(double));
     s->v0 = crm_carve(b, n3, sizeof(double));
     s->q1 = crm_carve(b, n3, sizeof(double));
@@ -92,7 +92,7 @@ static void lay_fixed_rows(const carom_world *w, int n, crm_block *b, void *obje
     (void)n;
     crm_rows none = {0};
     crm_rows *r = object ? object : &none;
-    const size_t rows = 2 * (size_t)w->n_joints;
+    const size_t rows = (size_t)w->n_joint_rows;
     const size_t n3 = 3 * (size_t)w->n_moving;
     r->joint_body = crm_carve(b, 2 * rows, sizeof(int));
     r->je = crm_carve(b, 6 * rows, sizeof(double));

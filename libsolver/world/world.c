@@ -230,7 +230,7 @@ carom_world_size carom_world_measure(const carom_world *world)
     z.n_vertices = w->n_vertices;
     z.n_joints = w->n_joints;
     z.n_unknowns = 3 * (z.n_dynamic + z.n_kinematic);
-    z.n_joint_rows = 2 * w->n_joints;
+    z.n_joint_rows = w->n_joint_rows;
     z.n_contacts = w->touches.n;
     for (int k = 0; k < w->touches.n; k++) {
         const crm_contact *c = &w->touches.list[k].contact;

@@ -50,6 +50,9 @@ typedef struct carom_gradient {
     double *radius;       /* n_shapes, in the order of adding */
     carom_vec2 *vertices; /* n_vertices, in the order of adding; body frame */
     carom_vec2 *anchors;  /* 2 n_joints: anchor in the frame of body A, then of body B */
+    double *axes;         /* n_joints: direction of the line in the frame of body A, an angle */
+    double *angles;       /* n_joints: held turn of body B against body A */
+    double *lengths;      /* n_joints: held distance */
 } carom_gradient;
 
 typedef struct carom_gradient_stats {

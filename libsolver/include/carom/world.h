@@ -115,8 +115,43 @@ CAROM_API carom_status carom_world_add_circle(carom_world *world, const carom_bo
                                               double radius, double density, int *index);
 CAROM_API carom_status carom_world_add_box(carom_world *world, const carom_body_def *def,
                                            double width, double height, double density, int *index);
-/* Pins two bodies together at a world point, at their present poses.  At least one is dynamic.
- * Joined bodies do not collide with each other. */
+
+/* What a joint holds still: docs/joint.md. */
+typedef enum carom_joint_kind {
+    CAROM_REVOLUTE,   /* a point: the bodies are pinned together */
+    CAROM_PRISMATIC,  /* B slides along a line of A and does not turn against A */
+    CAROM_WELD,       /* a point and the turn of B against A */
+    CAROM_WHEEL,      /* a point of B stays on a line of A */
+    CAROM_DISTANCE,   /* the distance of two points: a rod */
+    CAROM_LOCK_X,     /* x of a point of B against that of A, in the world's axes */
+    CAROM_LOCK_Y,     /* y, likewise */
+    CAROM_LOCK_ANGLE, /* the turn of B against A */
+    CAROM_N_JOINT_KINDS
+} carom_joint_kind;
+
+/* Of two bodies at their present poses, of which one at least is dynamic.  With a static body A a
+ * joint holds B to the world. */
+typedef struct carom_joint_def {
+    carom_joint_kind kind;
+    int body_a;
+    int body_b;
+    carom_vec2 anchor;   /* world point, of both bodies; of a distance joint the point of A [m] */
+    carom_vec2 anchor_b; /* distance joint: the point of B, apart from the other [m] */
+    carom_vec2 axis;     /* prismatic, wheel: direction of the line, of any length */
+    int collide;         /* 1: the two bodies may touch each other */
+} carom_joint_def;
+
+/* Bodies -1 (to be given), points at the origin, axis (1, 0); only bodies joined by a distance or a
+ * lock collide. */
+CAROM_API carom_joint_def carom_joint_defaults(carom_joint_kind kind);
+/* "revolute", "prismatic", "weld", "wheel", "distance", "lock_x", "lock_y", "lock_angle"; NULL for
+ * any other number. */
+CAROM_API const char *carom_joint_kind_name(carom_joint_kind kind);
+/* Adds a joint; *index (may be NULL) is its number.  CAROM_E_ARGUMENT, CAROM_E_MEMORY;
+ * CAROM_E_STATE once the world is sealed. */
+CAROM_API carom_status carom_world_add_joint(carom_world *world, const carom_joint_def *def,
+                                             int *index);
+/* A revolute joint at a world point.  Joined bodies do not collide with each other. */
 CAROM_API carom_status carom_world_add_revolute(carom_world *world, int body_a, int body_b,
                                                 carom_vec2 anchor, int *index);
 

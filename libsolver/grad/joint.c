@@ -1,0 +1,127 @@
+/* joint.c: reverse derivatives of what joints measure and of its rows.  docs/joint.md. */
+#include "grad/internal.h"
+
+#include <math.h>
+
+static double cross(carom_vec2 a, carom_vec2 b)
+{
+    return a.x * b.y - a.y * b.x;
+}
+
+static void add(carom_vec2 *to, carom_vec2 x, double scale)
+{
+    to->x += scale * x.x;
+    to->y += scale * x.y;
+}
+
+void crm_arm_vjp(double angle, carom_vec2 local, carom_vec2 arm_bar, double *angle_bar,
+                 carom_vec2 *local_bar)
+{
+    const double c = cos(angle);
+    const double s = sin(angle);
+    const carom_vec2 arm = {c * local.x - s * local.y, s * local.x + c * local.y};
+    *angle_bar += cross(arm, arm_bar);
+    if (!local_bar) return;
+    local_bar->x += c * arm_bar.x + s * arm_bar.y;
+    local_bar->y += -s * arm_bar.x + c * arm_bar.y;
+}
+
+/* Cotangents of what a measure is made of. */
+typedef struct frame_bar {
+    carom_vec2 arm_a, arm_b, d, u;
+} frame_bar;
+
+/* Of row(u) = (-cross(arm_a (+ d), u), -u, cross(arm_b, u), u). */
+static void row_vjp(const crm_joint_frame *f, carom_vec2 u, int turns, const double g[6],
+                    frame_bar *bar)
+{
+    carom_vec2 a = f->arm_a;
+    const carom_vec2 b = f->arm_b;
+    if (turns) add(&a, f->d, 1);
+    const carom_vec2 a_bar = {-g[0] * u.y, g[0] * u.x};
+    const carom_vec2 b_bar = {g[3] * u.y, -g[3] * u.x};
+    add(&bar->arm_a, a_bar, 1);
+    if (turns) add(&bar->d, a_bar, 1);
+    add(&bar->arm_b, b_bar, 1);
+    bar->u.x += g[0] * a.y - g[1] - g[3] * b.y + g[4];
+    bar->u.y += -g[0] * a.x - g[2] + g[3] * b.x + g[5];
+}
+
+/* Of the unit vector: turning with A, or along d; *turn_bar is the cotangent of its angle. */
+static void direction_vjp(crm_measure m, const crm_joint_frame *f, carom_vec2 u, frame_bar *bar,
+                          double *turn_bar)
+{
+    *turn_bar = 0;
+    if (m == CRM_ALONG || m == CRM_ASIDE) *turn_bar = cross(u, bar->u);
+    const double length = hypot(f->d.x, f->d.y);
+    if (m != CRM_APART || !(length > 0)) return;
+    const carom_vec2 normal = {-u.y, u.x};
+    add(&bar->d, normal, cross(u, bar->u) / length);
+}
+
+/* d = x_b - x_a with x = p + arm. */
+static void frame_vjp(const crm_joint *j, const double *q, const frame_bar *bar, double *q_bar,
+                      carom_vec2 *anchor_bar)
+{
+    carom_vec2 a_bar = bar->arm_a;
+    carom_vec2 b_bar = bar->arm_b;
+    double *qa = q_bar + 3 * j->body_a;
+    double *qb = q_bar + 3 * j->body_b;
+    add(&a_bar, bar->d, -1);
+    add(&b_bar, bar->d, 1);
+    qa[1] -= bar->d.x;
+    qa[2] -= bar->d.y;
+    qb[1] += bar->d.x;
+    qb[2] += bar->d.y;
+    crm_arm_vjp(q[3 * j->body_a], j->local_a, a_bar, qa, anchor_bar);
+    crm_arm_vjp(q[3 * j->body_b], j->local_b, b_bar, qb, anchor_bar ? anchor_bar + 1 : NULL);
+}
+
+void crm_measure_vjp(const crm_joint *j, crm_measure m, const double *q, const double row_bar[6],
+                     double value_bar, double *q_bar, crm_joint_bar *bar)
+{
+    if (m == CRM_TURN) { /* a constant row */
+        q_bar[3 * j->body_a] -= j->lever * value_bar;
+        q_bar[3 * j->body_b] += j->lever * value_bar;
+        bar->angle -= j->lever * value_bar;
+        return;
+    }
+    const crm_joint_frame f = crm_joint_frame_at(j, q);
+    const carom_vec2 u = crm_measure_direction(j, m, q, &f);
+    frame_bar x = {{0, 0}, {0, 0}, {0, 0}, {0, 0}};
+    double turn_bar;
+    if (row_bar) row_vjp(&f, u, m == CRM_ALONG || m == CRM_ASIDE, row_bar, &x);
+    add(&x.d, u, value_bar);
+    if (m == CRM_APART) {
+        bar->length -= value_bar;
+    } else {
+        add(&x.u, f.d, value_bar);
+    }
+    direction_vjp(m, &f, u, &x, &turn_bar);
+    q_bar[3 * j->body_a] += turn_bar;
+    bar->axis += turn_bar;
+    frame_vjp(j, q, &x, q_bar, bar->anchor);
+}
+
+static void give(const crm_reverse *r, int joint, const crm_joint_bar *bar)
+{
+    const carom_gradient *g = &r->sink.g;
+    for (int i = 0; g->anchors && i < 2; i++) add(&g->anchors[2 * joint + i], bar->anchor[i], 1);
+    if (g->axes) g->axes[joint] += bar->axis;
+    if (g->angles) g->angles[joint] += bar->angle;
+    if (g->lengths) g->lengths[joint] += bar->length;
+}
+
+void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double *je_bar,
+                   const double *error_bar, double *q_bar, int with_parameters)
+{
+    const crm_joint *j = &r->world->joints[joint];
+    const crm_measure *measures;
+    const int n = crm_joint_measures(j->kind, &measures);
+    crm_joint_bar bar = {{{0, 0}, {0, 0}}, 0, 0, 0};
+    for (int k = 0; k < n; k++) {
+        crm_measure_vjp(j, measures[k], q, je_bar ? &je_bar[6 * k] : NULL,
+                        error_bar ? error_bar[k] : 0, q_bar, &bar);
+    }
+    if (with_parameters) give(r, joint, &bar);
+}

@@ -1,0 +1,137 @@
+/* add_joint.c: adding joints.  docs/joint.md. */
+#include "world/internal.h"
+
+#include <math.h>
+
+/* Points nearer to each other than this have no direction [largest coordinate]. */
+static const double NO_DIRECTION = 1e-12;
+
+const char *carom_joint_kind_name(carom_joint_kind kind)
+{
+    static const char *const names[CAROM_N_JOINT_KINDS] = {
+        [CAROM_REVOLUTE] = "revolute", [CAROM_PRISMATIC] = "prismatic",   [CAROM_WELD] = "weld",
+        [CAROM_WHEEL] = "wheel",       [CAROM_DISTANCE] = "distance",     [CAROM_LOCK_X] = "lock_x",
+        [CAROM_LOCK_Y] = "lock_y",     [CAROM_LOCK_ANGLE] = "lock_angle",
+    };
+    const int k = (int)kind;
+    return k >= 0 && k < CAROM_N_JOINT_KINDS ? names[k] : NULL;
+}
+
+carom_joint_def carom_joint_defaults(carom_joint_kind kind)
+{
+    carom_joint_def d = {0};
+    d.kind = kind;
+    d.body_a = d.body_b = -1;
+    d.axis.x = 1;
+    d.collide = kind == CAROM_DISTANCE || kind == CAROM_LOCK_X || kind == CAROM_LOCK_Y ||
+                kind == CAROM_LOCK_ANGLE;
+    return d;
+}
+
+static int finite2(carom_vec2 v)
+{
+    return isfinite(v.x) && isfinite(v.y);
+}
+
+static carom_status check_bodies(carom_world *w, const carom_joint_def *d)
+{
+    const int id = w->n_joints;
+    const int a = d->body_a;
+    const int b = d->body_b;
+    if (w->sealed) {
+        return crm_world_fail(w, CAROM_E_STATE, "joints are added before the world is sealed");
+    }
+    if (!carom_joint_kind_name(d->kind)) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: there is no kind %d", id,
+                              (int)d->kind);
+    }
+    if (a < 0 || a >= w->n_bodies || b < 0 || b >= w->n_bodies) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: there is no body %d", id,
+                              a < 0 || a >= w->n_bodies ? a : b);
+    }
+    if (a == b) return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: one body twice", id);
+    if (w->bodies[a].type != CAROM_DYNAMIC && w->bodies[b].type != CAROM_DYNAMIC) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: neither body %d nor %d is dynamic",
+                              id, a, b);
+    }
+    return CAROM_OK;
+}
+
+static carom_status check_places(carom_world *w, const carom_joint_def *d)
+{
+    const int id = w->n_joints;
+    const carom_vec2 a = d->anchor;
+    const carom_vec2 b = d->anchor_b;
+    if (!finite2(a) || (d->kind == CAROM_DISTANCE && !finite2(b))) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: anchor not finite", id);
+    }
+    if (d->kind == CAROM_DISTANCE) {
+        const double size = fmax(fmax(fabs(a.x), fabs(a.y)), fmax(fabs(b.x), fabs(b.y)));
+        if (hypot(b.x - a.x, b.y - a.y) > NO_DIRECTION * size) return CAROM_OK;
+        return crm_world_fail(w, CAROM_E_ARGUMENT,
+                              "joint %d: the points of a distance joint meet; set them apart, or "
+                              "use a revolute joint",
+                              id);
+    }
+    if (d->kind != CAROM_PRISMATIC && d->kind != CAROM_WHEEL) return CAROM_OK;
+    if (finite2(d->axis) && hypot(d->axis.x, d->axis.y) > 0) return CAROM_OK;
+    return crm_world_fail(w, CAROM_E_ARGUMENT,
+                          "joint %d: axis (%g, %g) of a %s joint is no direction; give one", id,
+                          d->axis.x, d->axis.y, carom_joint_kind_name(d->kind));
+}
+
+/* R(angle)' (point - position) */
+static carom_vec2 to_local(carom_pose p, carom_vec2 point)
+{
+    const carom_vec2 d = {point.x - p.x, point.y - p.y};
+    return crm_rotate(-p.angle, d);
+}
+
+static crm_joint make_joint(const carom_world *w, const carom_joint_def *d)
+{
+    const carom_pose a = crm_pose(w->q, d->body_a);
+    const carom_pose b = crm_pose(w->q, d->body_b);
+    const carom_vec2 on_b = d->kind == CAROM_DISTANCE ? d->anchor_b : d->anchor;
+    const crm_measure *measures;
+    crm_joint j = {0};
+    j.kind = d->kind;
+    j.body_a = d->body_a;
+    j.body_b = d->body_b;
+    j.local_a = to_local(a, d->anchor);
+    j.local_b = to_local(b, on_b);
+    j.axis = atan2(d->axis.y, d->axis.x) - a.angle;
+    j.angle = b.angle - a.angle;
+    j.length = hypot(on_b.x - d->anchor.x, on_b.y - d->anchor.y);
+    j.collide = d->collide != 0;
+    j.first_row = w->n_joint_rows;
+    j.n_rows = crm_joint_measures(d->kind, &measures);
+    return j;
+}
+
+carom_status carom_world_add_joint(carom_world *world, const carom_joint_def *def, int *index)
+{
+    if (!world || !def) return CAROM_E_ARGUMENT;
+    carom_world *w = world;
+    carom_status e = check_bodies(w, def);
+    if (!e) e = check_places(w, def);
+    if (e) return e;
+    void *joints = w->joints;
+    e = crm_reserve(&w->memory, &joints, &w->max_joints, w->n_joints + 1, sizeof *w->joints);
+    w->joints = joints;
+    if (e) return crm_world_fail(w, e, "no memory for joint %d", w->n_joints);
+    if (index) *index = w->n_joints;
+    const crm_joint j = make_joint(w, def);
+    w->joints[w->n_joints++] = j;
+    w->n_joint_rows += j.n_rows;
+    return CAROM_OK;
+}
+
+carom_status carom_world_add_revolute(carom_world *world, int body_a, int body_b, carom_vec2 anchor,
+                                      int *index)
+{
+    carom_joint_def d = carom_joint_defaults(CAROM_REVOLUTE);
+    d.body_a = body_a;
+    d.body_b = body_b;
+    d.anchor = anchor;
+    return carom_world_add_joint(world, &d, index);
+}
