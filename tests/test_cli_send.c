@@ -116,10 +116,40 @@ static void send_tells_what_went_wrong(void **state)
     snprintf(line, sizeof line, "watch --url %s", s.url);
     c = program_run(line);
     assert_int_equal(c.code, 2);
-    assert_non_null(strstr(c.err, "no connection to"));
+    assert_non_null(strstr(c.err, "nothing listens at"));
     program_free(&c);
     program_refuses("watch here", "one argument too many");
     program_refuses("watch --for x", "--for: \"x\" is not a number");
+}
+
+/* Ctrl-C: the last state is written, though a request of 256 steps does not end at a sample. */
+static void interrupted_runs_keep_their_last_state(void **state)
+{
+    (void)state;
+    server s = start_server();
+    char line[512];
+    snprintf(line, sizeof line,
+             "send %%/scenes/e_cradle.json --dt 0.01 --duration 1e5 --url %s >sent 2>said & p=$!; "
+             "sleep 1; "
+             "kill -INT $p; wait $p",
+             s.url);
+    program_call c = program_run(line);
+    assert_int_equal(c.code, 2);
+    char *said = program_read("said");
+    assert_non_null(strstr(said, "interrupted after step"));
+    free(said);
+    char *sent = program_read("sent");
+    const int n = program_count_lines(sent);
+    json_t *end = program_line(sent, n - 1);
+    json_t *last = program_line(sent, n - 2);
+    const double steps = program_number(json_object_get(end, "summary"), "steps");
+    assert_true(steps > 0);
+    assert_true(program_number(last, "step") == steps);
+    json_decref(end);
+    json_decref(last);
+    free(sent);
+    program_free(&c);
+    stop_server(&s);
 }
 
 /* Heartbeats come twice a second; a run beside it is heard. */
@@ -157,6 +187,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(send_gives_what_run_gives),
         cmocka_unit_test(send_tells_what_went_wrong),
+        cmocka_unit_test(interrupted_runs_keep_their_last_state),
         cmocka_unit_test(watch_hears_the_bus),
     };
     return cmocka_run_group_tests(tests, program_make_folder, program_remove_folder);

@@ -196,6 +196,34 @@ static const fault FAULTS[] = {
      "joints[0].anchor: must be given"},
 };
 
+/* The mark that some editors put in front. */
+static void a_byte_order_mark_is_no_fault(void **state)
+{
+    (void)state;
+    crm_problems problems;
+    crm_scene *scene = read_text("\xEF\xBB\xBF" HEAD "\"bodies\":[]}", &problems);
+    expect_valid(scene, &problems);
+    crm_scene_free(scene);
+    crm_problems_free(&problems);
+}
+
+static void files_without_text(void **state)
+{
+    static const char *const texts[] = {"", " \n\t\n", "\xEF\xBB\xBF"};
+    (void)state;
+    for (size_t k = 0; k < sizeof texts / sizeof texts[0]; k++) {
+        crm_problems problems;
+        assert_null(read_text(texts[k], &problems));
+        assert_int_equal(problems.count, 1);
+        assert_non_null(strstr(problems.text[0], ": the file is empty"));
+        crm_problems_free(&problems);
+    }
+    crm_problems problems = crm_problems_of("/tmp"); /* a folder */
+    assert_null(crm_scene_read(&problems));
+    assert_non_null(strstr(problems.text[0], "/tmp: cannot be read: "));
+    crm_problems_free(&problems);
+}
+
 static void faults_name_their_place(void **state)
 {
     (void)state;
@@ -450,6 +478,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scenes_of_the_data_are_read),
+        cmocka_unit_test(a_byte_order_mark_is_no_fault),
+        cmocka_unit_test(files_without_text),
         cmocka_unit_test(faults_name_their_place),
         cmocka_unit_test(all_faults_come_at_once),
         cmocka_unit_test(ignored_keys),

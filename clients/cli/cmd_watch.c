@@ -3,6 +3,7 @@
 #include "carom_state_t.h"
 #include "carom_status_t.h"
 #include "cmd.h"
+#include "io/memory.h"
 #include "io/output.h"
 #include "io/progress.h"
 #include "wire.h"
@@ -22,6 +23,14 @@ typedef struct watching {
     int n_subscriptions;
     lcm_subscription_t *subscriptions[3];
 } watching;
+
+/* What the command line asks for. */
+typedef struct plan {
+    const char *url;
+    const char *name;
+    double seconds;
+    double count;
+} plan;
 
 static void put_integer(crm_output *out, const char *key, int64_t x)
 {
@@ -166,44 +175,61 @@ static int listen(lcm_t *lcm, watching *w, double seconds, double count)
     return 1;
 }
 
-static int watch(const crm_arguments *a, lcm_t *lcm, const char *url)
+/* 1: a client could join there; else the reason is on stderr, in fewer words than LCM's. */
+static int is_there(const char *url, const char *name)
 {
-    const char *name = crm_argument(a, "--name");
-    double seconds = HUGE_VAL;
-    double count = HUGE_VAL;
+    carom_client *client = carom_client_create();
+    if (!client) crm_no_memory();
+    const carom_client_code code = carom_client_connect(client, url, name);
+    if (code < 0) fprintf(stderr, "carom watch: %s\n", carom_client_error(client));
+    carom_client_destroy(client);
+    return code >= 0;
+}
+
+static int watch(const plan *p, lcm_t *lcm, watching *w)
+{
+    int good = lcm_get_fileno(lcm) >= 0 && subscribe(lcm, p->name, CRM_WIRE_STATE, on_state, w) &&
+               subscribe(lcm, p->name, CRM_WIRE_REPLY, on_reply, w) &&
+               subscribe(lcm, p->name, CRM_WIRE_STATUS, on_status, w);
+    if (good) good = listen(lcm, w, p->seconds, p->count);
+    unsubscribe(lcm, w);
+    if (!good) fprintf(stderr, "carom watch: the connection to %s broke\n", p->url);
+    return good ? CRM_DONE : CRM_FAILED;
+}
+
+static int watch_to_output(const crm_arguments *a, const plan *p)
+{
     watching w;
+    memset(&w, 0, sizeof w);
     w.limits = crm_wire_default_limits();
-    w.seen = 0;
-    w.n_subscriptions = 0;
-    if (!crm_argument_number(a, "--for", 0, 1e9, &seconds) ||
-        !crm_argument_number(a, "--count", 1, 1e9, &count)) {
-        return CRM_USAGE;
+    lcm_t *lcm = lcm_create(p->url);
+    if (!lcm) {
+        fprintf(stderr, "carom watch: LCM does not open %s\n", p->url);
+        return CRM_FAILED;
     }
-    if (name && strlen(name) > 32) return crm_usage_error(a->command, "--name: at most 32 bytes");
-    if (!crm_output_open(&w.out, crm_argument(a, "--out"))) return CRM_USAGE;
-    crm_catch_interrupts();
-    int good = lcm_get_fileno(lcm) >= 0 && subscribe(lcm, name, CRM_WIRE_STATE, on_state, &w) &&
-               subscribe(lcm, name, CRM_WIRE_REPLY, on_reply, &w) &&
-               subscribe(lcm, name, CRM_WIRE_STATUS, on_status, &w);
-    if (good) good = listen(lcm, &w, seconds, count);
-    unsubscribe(lcm, &w);
-    if (!good) fprintf(stderr, "carom watch: no connection to %s; start a server: caromd\n", url);
-    return crm_output_close(&w.out) && good ? CRM_DONE : CRM_FAILED;
+    int code = CRM_USAGE;
+    if (crm_output_open(&w.out, crm_argument(a, "--out"))) {
+        crm_catch_interrupts();
+        code = watch(p, lcm, &w);
+        if (!crm_output_close(&w.out)) code = CRM_FAILED;
+    }
+    lcm_destroy(lcm);
+    return code;
 }
 
 static int run(const crm_arguments *a)
 {
-    const char *url = crm_argument(a, "--url");
-    if (!url) url = CAROM_CLIENT_URL;
-    signal(SIGPIPE, SIG_IGN); /* a hub that is gone is told by lcm_handle */
-    lcm_t *lcm = lcm_create(url);
-    if (!lcm) {
-        fprintf(stderr, "carom watch: %s is no LCM network\n", url);
-        return CRM_FAILED;
+    plan p = {crm_argument(a, "--url"), crm_argument(a, "--name"), HUGE_VAL, HUGE_VAL};
+    if (!p.url) p.url = CAROM_CLIENT_URL;
+    if (!crm_argument_number(a, "--for", 0, 1e9, &p.seconds) ||
+        !crm_argument_number(a, "--count", 1, 1e9, &p.count)) {
+        return CRM_USAGE;
     }
-    const int code = watch(a, lcm, url);
-    lcm_destroy(lcm);
-    return code;
+    if (p.name && strlen(p.name) > 32) {
+        return crm_usage_error(a->command, "--name: at most 32 bytes");
+    }
+    signal(SIGPIPE, SIG_IGN); /* a hub that is gone is told by lcm_handle */
+    return is_there(p.url, p.name) ? watch_to_output(a, &p) : CRM_FAILED;
 }
 
 static const crm_option options[] = {{"--url", CRM_TAKES_VALUE}, {"--name", CRM_TAKES_VALUE},

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from carom import (
     AsyncClient,
+    CaromError,
     Client,
     ComputationFailed,
     NoServer,
@@ -140,16 +141,26 @@ class Blocking(WithServer):
         np.testing.assert_array_equal(state.q[:, 1:], places)
 
     def test_refusals(self):
-        scene = Scene()
-        scene.dynamic(circle(-1.0), mass=1, inertia=1)
-        with self.assertRaisesRegex(Refused, "radius"):
-            self.client.open(scene)
+        with self.assertRaisesRegex(SessionLost, "open a scene first"):
+            self.client.step(1)
+        with self.assertRaisesRegex(Refused, "no_such_setting"):
+            self.client.open(Scene(settings={"no_such_setting": 1}))
         self.client.open(free_body())
         with self.assertRaises(Refused):
             self.client.gradient({4: (np.zeros((1, 3)), None)})  # nothing is recorded
         with self.assertRaises(Refused):
             self.client.restore(3)
+        with self.assertRaisesRegex(Refused, "--max-steps"):
+            self.client.step(10**9)  # and no list of so many states
+        with self.assertRaisesRegex(CaromError, "colour: not one of q0"):
+            self.client.gradient({}, wrt="colour")
         self.assertEqual(self.client.step(1)[0].step, 1)  # the session goes on
+
+    def test_files_are_opened(self):
+        self.client.open(SCENES / "f_pendulum.json")
+        first = self.client.step(1)[0]
+        self.client.open(Scene.from_json(SCENES / "f_pendulum.json").to_json())
+        np.testing.assert_array_equal(self.client.step(1)[0].q, first.q)
 
     def test_failed_computation(self):
         scene = Scene.from_json(SCENES / "a_slide.json")

@@ -42,6 +42,15 @@ class Demo(unittest.TestCase):
             self.assertIn("ms per step", call.stdout)
             self.assertGreater(Path(folder, "chain.png").stat().st_size, 10000)
 
+    def test_no_folder(self):
+        with tempfile.NamedTemporaryFile() as file:
+            call = subprocess.run(
+                [sys.executable, "-m", "carom.demo", "--caromd", CAROMD, "--out", file.name],
+                capture_output=True, text=True)
+        self.assertEqual(call.returncode, 1)
+        self.assertIn(f"{file.name}: the picture cannot go there: File exists", call.stderr)
+        self.assertEqual(call.stdout, "")  # told before the search, not after it
+
     def test_no_server(self):
         call = subprocess.run([sys.executable, "-m", "carom.demo", "--caromd", "/nonexistent/caromd"],
                               capture_output=True, text=True)

@@ -4,7 +4,7 @@ import random
 import unittest
 
 from carom import ComputationFailed, NoServer, Refused, ServerTimeout, SessionLost
-from carom.calls import published_steps
+from carom.calls import PublishedSteps
 from carom.exchange import PIECE_BYTES, Exchange, Protocol, session_request
 from carom.messages import (
     parameter_gradient_t,
@@ -108,7 +108,7 @@ class Bus:
         code, end = reply_t.OK, self.step + message.num_steps
         if self.fail_at is not None and end > self.fail_at:
             code, end = reply_t.FAILED, self.fail_at
-        steps = [s for s in published_steps(self.step, message.num_steps, message.publish_every)
+        steps = [s for s in PublishedSteps(self.step, message.num_steps, message.publish_every)
                  if s <= end]
         self.step = end
         out = []
@@ -130,7 +130,7 @@ class Bus:
         message = step_request_t()
         message.from_step = self.protocol.planned_step
         message.num_steps, message.publish_every = count, every
-        wanted = published_steps(message.from_step, count, every)
+        wanted = PublishedSteps(message.from_step, count, every)
         self.protocol.planned_step += count
         return self.protocol.start(Exchange("CAROM_STEP", message, wanted, on_state=on_state))
 
@@ -145,7 +145,7 @@ class Loss(unittest.TestCase):
                 exchange = bus.wait(bus.steps(7, every=2, on_state=lambda m: seen.append(m.step)))
                 self.assertIsNone(exchange.error)
             self.assertEqual(bus.executed, list(range(1, 12)))
-            self.assertEqual(seen, [s for k in range(10) for s in published_steps(7 * k, 7, 2)])
+            self.assertEqual(seen, [s for k in range(10) for s in PublishedSteps(7 * k, 7, 2)])
             self.assertEqual(bus.protocol.step, 70)
             self.assertGreater(bus.protocol.repeated, 0)
 
@@ -302,10 +302,10 @@ class Refusals(unittest.TestCase):
 
 class Steps(unittest.TestCase):
     def test_published_steps(self):
-        self.assertEqual(published_steps(0, 6, 2), [2, 4, 6])
-        self.assertEqual(published_steps(10, 5, 2), [12, 14, 15])
-        self.assertEqual(published_steps(0, 5, 0), [5])
-        self.assertEqual(published_steps(3, 0, 1), [3])
+        self.assertEqual(list(PublishedSteps(0, 6, 2)), [2, 4, 6])
+        self.assertEqual(list(PublishedSteps(10, 5, 2)), [12, 14, 15])
+        self.assertEqual(list(PublishedSteps(0, 5, 0)), [5])
+        self.assertEqual(list(PublishedSteps(3, 0, 1)), [3])
 
 
 if __name__ == "__main__":

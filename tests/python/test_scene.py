@@ -1,13 +1,14 @@
 """Scenes: building, files, what is sent."""
 
 import json
+import math
 import os
 import tempfile
 import unittest
 from pathlib import Path
 
 import numpy as np
-from carom import Scene, SceneError, box, capsule, circle, segment
+from carom import Scene, SceneError, box, capsule, circle, hull, segment
 from carom.calls import scene_message
 from carom.messages import scene_t
 
@@ -61,6 +62,57 @@ class Building(unittest.TestCase):
         np.testing.assert_allclose(body.mass_and_inertia(), (40, 40 * 20 / 12), rtol=1e-15)
 
 
+class Mistakes(unittest.TestCase):
+    """Refused where they are made, with their place; the scene stays as it was."""
+
+    def refused(self, call, text):
+        with self.assertRaisesRegex(SceneError, text):
+            call()
+
+    def test_bodies(self):
+        cases = [
+            (circle(1), {"mass": -1}, r"bodies\[1\].mass: must be > 0, is -1"),
+            (circle(1), {"mass": math.nan}, "mass: must be finite"),
+            (circle(1), {"mass": "heavy"}, "mass: must be a number, is 'heavy'"),
+            (circle(1), {}, "mass: a dynamic body needs"),
+            (circle(1), {"density": 0}, "density: must be > 0"),
+            (circle(-1), {"mass": 1}, "shape.radius: must be > 0, is -1"),
+            (circle(0), {"mass": 1}, "shape.radius: must be > 0, is 0"),
+            (box(0, 1), {"mass": 1}, "shape.vertices: the hull has no area"),
+            (hull([(0, 0), (0, 1), (1, 0)]), {"mass": 1}, "clockwise; reverse"),
+            (hull([(0, 0), (1, 0)]), {"mass": 1}, "three vertices or more, here are 2"),
+            (hull([(0, 0), (2, 0), (0.5, 0.5), (0, 2)]), {"mass": 1}, r"vertices\[2\]: not convex"),
+            ([circle(1), segment((1, 1), (1, 1))], {"mass": 1}, r"shapes\[1\].vertices: a segment"),
+            (circle(1), {"mass": 1, "position": (1,)}, "position: must be 2 numbers"),
+            (circle(1), {"mass": 1, "position": "ab"}, r"position\[0\]: must be a number, is 'a'"),
+            (circle(1), {"mass": 1, "friction": -0.1}, "friction: must be >= 0"),
+            (circle(1), {"mass": 1, "restitution": 1.1}, "restitution: must be 0 to 1, is 1.1"),
+            (circle(1), {"mass": 1, "forces": [1, 2]}, "forces: must be 3 numbers"),
+            (circle(1), {"mass": 1, "forces": [[1, 0, 0, 0], [1, 0, 0, 0]]}, "times must increase"),
+        ]
+        scene = Scene()
+        scene.static(box(1, 1))
+        for shape, fields, text in cases:
+            self.refused(lambda: scene.dynamic(shape, **fields), text)
+        self.refused(lambda: scene.static(box(1, 1), velocity=(1, 0)), "does not move")
+        self.assertEqual(len(scene.bodies), 1)
+
+    def test_joints(self):
+        scene = Scene()
+        floor, wall = scene.static(box(1, 1)), scene.static(box(1, 1))
+        ball = scene.dynamic(circle(1), mass=1)
+        self.refused(lambda: scene.pin(floor, ball, (0, math.inf)), r"joints\[0\].anchor\[1\]: must be")
+        self.refused(lambda: scene.pin(ball, ball, (0, 0)), "to itself")
+        self.refused(lambda: scene.pin(ball, 7, (0, 0)), "body_b: there is no body 7")
+        self.refused(lambda: scene.pin(floor, wall, (0, 0)), "neither body is dynamic")
+        self.assertEqual(scene.joints, [])
+
+    def test_scenes(self):
+        self.refused(lambda: Scene(dt=-1), "dt: must be > 0, is -1")
+        self.refused(lambda: Scene(gravity=3), "gravity: must be 2 numbers")
+        self.refused(lambda: Scene(duration=math.inf), "duration: must be finite")
+
+
 class Forces(unittest.TestCase):
     def test_impulse_is_exact_for_any_step(self):
         rows = [[0.1, 1, 0, 0], [0.35, 0, 2, 0], [0.7, 0, 0, -3]]
@@ -106,6 +158,11 @@ class Files(unittest.TestCase):
         cases = [
             ({}, "format: must be"),
             ({**HEAD, "bodys": []}, "bodys: unknown key"),
+            ({**HEAD, "bodies": {}}, "bodies: must be an array"),
+            ({**HEAD, "bodies": [None]}, r"bodies\[0\]: must be an object"),
+            ({**HEAD, "bodies": [{"mass": 1, "shape": 3}]}, r"bodies\[0\].shape: must be an object"),
+            ({**HEAD, "settings": []}, "settings: must be an object"),
+            ({**HEAD, "dt": "0.1 s"}, "dt: must be a number, is '0.1 s'"),
             ({**HEAD, "bodies": [{**BALL, "masss": 1}]}, r"bodies\[0\].masss: unknown key"),
             ({**HEAD, "bodies": [{"type": "fixed"}]}, r"bodies\[0\].type: must be one of"),
             ({**HEAD, "bodies": [{}]}, r"bodies\[0\].mass: a dynamic body needs"),

@@ -2,6 +2,7 @@
 
 #include "scan.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -117,16 +118,24 @@ static char *read_stream(crm_problems *problems, FILE *f, size_t *length)
 
 static char *read_file(crm_problems *problems, size_t *length)
 {
-    if (strcmp(problems->file, "-") == 0) {
-        problems->file = "standard input";
-        return read_stream(problems, stdin, length);
-    }
-    FILE *f = fopen(problems->file, "rb");
+    const int is_stdin = strcmp(problems->file, "-") == 0;
+    if (is_stdin) problems->file = "standard input";
+    errno = 0;
+    FILE *f = is_stdin ? stdin : fopen(problems->file, "rb");
     char *text = f ? read_stream(problems, f, length) : NULL;
-    if (f) fclose(f);
-    if (!text && !problems->no_memory)
-        crm_fault(problems, NULL, "cannot be read; check name and permissions");
+    const int reason = errno;
+    if (f && !is_stdin) fclose(f);
+    if (!text && !problems->no_memory) {
+        crm_fault(problems, NULL, "cannot be read: %s", strerror(reason));
+    }
     return text;
+}
+
+/* The mark that some editors put in front of UTF-8 becomes blanks. */
+static void blank_byte_order_mark(char *text)
+{
+    static const char mark[] = "\xEF\xBB\xBF";
+    if (strncmp(text, mark, 3) == 0) memset(text, ' ', 3);
 }
 
 /* Overwrites the word, wherever it stands outside of texts, by "" and blanks: what comes after it
@@ -153,6 +162,7 @@ static json_t *load(crm_problems *problems, int of_python)
     size_t length = 0;
     char *text = read_file(problems, &length);
     if (!text) return NULL;
+    blank_byte_order_mark(text);
     if (of_python) {
         blank_word(text, "-Infinity");
         blank_word(text, "Infinity");
@@ -160,7 +170,9 @@ static json_t *load(crm_problems *problems, int of_python)
     }
     json_error_t error;
     json_t *json = json_loadb(text, length, 0, &error);
-    if (!json) {
+    if (!json && strspn(text, " \t\r\n") == length) {
+        crm_fault(problems, NULL, "the file is empty");
+    } else if (!json) {
         crm_fault(problems, NULL, "line %d, column %d: %s", error.line, error.column, error.text);
     } else if (crm_scan_duplicates(text, problems) == 0 && !problems->no_memory) {
         /* Keys that differ in the file only by escapes are left to jansson. */

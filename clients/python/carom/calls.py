@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from .errors import CaromError
+from .errors import CaromError, SessionLost
 from .exchange import Exchange, Protocol, check, session_request
 from .messages import loss_gradient_t, parameter_gradient_t, scene_t, step_request_t
 from .results import NO_PARAMETER, WRT, gradient_of, parameters_of, state_of
+from .scene import Scene
 
 
 def scene_message(scene):
@@ -72,12 +74,22 @@ def _fill_shapes(m, scene):
     m.num_vertex_coords = len(m.vertices)
 
 
-def published_steps(start, count, every):
-    """Steps of the states that a request publishes: every n-th and the last."""
-    steps = list(range(start + every, start + count + 1, every)) if every > 0 else []
-    if not steps or steps[-1] != start + count:
-        steps.append(start + count)
-    return steps
+class PublishedSteps(Sequence):
+    """Steps of the states that a request publishes: every n-th and the last.  No list: requests that
+    a server will refuse may ask for any number."""
+
+    def __init__(self, start, count, every):
+        self._every = range(start + every, start + count + 1, every) if every > 0 else range(0)
+        self._last = start + count
+        self._extra = not self._every or self._every[-1] != self._last
+
+    def __len__(self):
+        return len(self._every) + self._extra
+
+    def __getitem__(self, k):
+        if self._extra and k in (-1, len(self._every)):
+            return self._last
+        return self._every[k]
 
 
 class Calls:
@@ -92,6 +104,9 @@ class Calls:
         raise NotImplementedError
 
     def _request(self, exchange, finish=lambda exchange: None, numbered=True):
+        if self.scene is None:
+            raise SessionLost("no session is open: open a scene first")
+
         def end(done):
             check(done)
             self.seconds = done.reply.seconds
@@ -102,7 +117,10 @@ class Calls:
     # --- scenes and steps
 
     def open(self, scene):
-        """Opens a session with the scene, or replaces the scene of the session: step 0 again."""
+        """Opens a session with the scene (a Scene, or what Scene.from_json reads), or replaces the
+        scene of the session: step 0 again."""
+        if not isinstance(scene, Scene):
+            scene = Scene.from_json(scene)
         if self.protocol.lost:
             self.protocol.renew_session()
         message = scene_message(scene)
@@ -127,7 +145,7 @@ class Calls:
         message.record = {False: step_request_t.RECORD_OFF, True: step_request_t.RECORD_ON,
                           "restart": step_request_t.RECORD_RESTART}[record]
         self._fill_forces(message, start, forces)
-        steps = published_steps(start, message.num_steps, message.publish_every)
+        steps = PublishedSteps(start, message.num_steps, message.publish_every)
         callback = (lambda m: on_state(state_of(m))) if on_state else None
         exchange = Exchange("CAROM_STEP", message, steps, on_state=callback)
         self.protocol.planned_step = start + message.num_steps
@@ -167,7 +185,7 @@ class Calls:
         n = len(self.scene.bodies) if self.scene else 0
         message = loss_gradient_t()
         message.cost = float(cost)
-        for name in wrt:
+        for name in (wrt,) if isinstance(wrt, str) else wrt:
             if name not in WRT:
                 raise CaromError(f"{name}: not one of {', '.join(WRT)}")
             message.wanted |= WRT[name]
@@ -188,7 +206,7 @@ class Calls:
         message = parameter_gradient_t()
         if wrt is None:
             wrt = [name for name in gradient.wanted() if name not in NO_PARAMETER]
-        for name in wrt:
+        for name in (wrt,) if isinstance(wrt, str) else wrt:
             values = np.ravel(getattr(gradient, name)).tolist()
             message.wanted |= WRT[name]
             setattr(message, name, values)

@@ -195,6 +195,10 @@ def picture(path, data, search):
 def demo(caromd, out):
     """The whole experiment; 0 when the mass was found within 1 %."""
     clock = Clock()
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CaromError(f"{out}: the picture cannot go there: {error.strerror}") from None
     with Server(caromd) as server, Client(server.url) as client:
         print(f"caromd at {server.url}")
         print(f"chain of {LINKS} links, {TRUE_MASS:g} kg, hit by a ball of {BALL_MASS:g} kg at "
@@ -204,7 +208,6 @@ def demo(caromd, out):
     error = abs(mass / TRUE_MASS - 1)
     print(f"\nmass {mass:.9g} kg after {len(search.masses)} iterations, off by {100 * error:.2g} %")
     print(*clock.lines(), sep="\n")
-    out.mkdir(parents=True, exist_ok=True)
     picture(out / "chain.png", data, search)
     print(f"picture: {out / 'chain.png'}")
     return 0 if error < 0.01 else 1
@@ -219,6 +222,8 @@ def main():
         sys.exit(demo(arguments.caromd, arguments.out))
     except CaromError as error:
         sys.exit(f"carom.demo: {error}")
+    except KeyboardInterrupt:
+        sys.exit("\ncarom.demo: interrupted")
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ class Exchange:
     def __init__(self, channel, message, steps=(), needs=None, on_state=None):
         self.channel = channel
         self.message = message
-        self.steps = list(steps)  # of the states that are expected
+        self.steps = steps  # of the states that are expected
         self.needs = needs  # channel of the one other answer that is expected
         self.on_state = on_state
         self.states = {}

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from . import shapes as _shapes
+from .checks import check_body, check_joint, number, numbers
 from .errors import SceneError
 from .shapes import Shape
 
 FORMAT = "carom-scene/1"
-TYPES = ("dynamic", "static", "kinematic")
 CENTROID_TOL = 1e-6  # of the extent: how far a centroid may be from the position
 
 
@@ -119,10 +119,10 @@ class Scene:
     def __init__(self, name="", gravity=(0.0, -9.81), dt=1 / 60, duration=None, sample=None,
                  settings=None):
         self.name = name
-        self.gravity = tuple(float(g) for g in gravity)
-        self.dt = float(dt)
-        self.duration = duration
-        self.sample = sample
+        self.gravity = numbers("gravity", gravity, 2)
+        self.dt = number("dt", dt, 0, above=True)
+        self.duration = None if duration is None else number("duration", duration, 0)
+        self.sample = None if sample is None else number("sample", sample, 0, above=True)
         self.settings = dict(settings or {})
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
@@ -131,8 +131,7 @@ class Scene:
 
     def add(self, body):
         """Adds a Body, gives it its index and returns it."""
-        if body.type not in TYPES:
-            raise SceneError(f"type: must be one of {', '.join(TYPES)}, is {body.type!r}")
+        check_body(f"bodies[{len(self.bodies)}]", body)
         body.index = len(self.bodies)
         self.bodies.append(body)
         return body
@@ -151,8 +150,10 @@ class Scene:
 
     def pin(self, body_a, body_b, anchor, name=""):
         """Revolute joint at a world point; joined bodies do not collide."""
-        joint = Joint(int(body_a.__index__()), int(body_b.__index__()), tuple(map(float, anchor)),
+        place = f"joints[{len(self.joints)}]"
+        joint = Joint(body_a.__index__(), body_b.__index__(), numbers(f"{place}.anchor", anchor, 2),
                       name=name)
+        check_joint(place, joint, self.bodies)
         self.joints.append(joint)
         return joint
 
@@ -196,6 +197,11 @@ class Scene:
         if not isinstance(source, dict):
             source = _load_file(source)
         _check_keys("", source, _SCENE_KEYS)
+        for key in ("bodies", "joints"):
+            if not isinstance(source.get(key, []), (list, tuple)):
+                raise SceneError(f"{key}: must be an array [...]")
+        if not isinstance(source.get("settings", {}), dict):
+            raise SceneError("settings: must be an object {name: value, ...}")
         if source.get("format") != FORMAT:
             raise SceneError(f"format: must be {FORMAT!r}, is {source.get('format')!r}")
         settings = dict(source.get("settings", {}))
@@ -205,7 +211,9 @@ class Scene:
         for i, data in enumerate(source.get("bodies", ())):
             scene.add(_body_from_json(f"bodies[{i}]", data))
         for k, data in enumerate(source.get("joints", ())):
-            scene.joints.append(scene._joint_from_json(f"joints[{k}]", data))
+            joint = scene._joint_from_json(f"joints[{k}]", data)
+            check_joint(f"joints[{k}]", joint, scene.bodies)
+            scene.joints.append(joint)
         return scene
 
     def to_json(self):
@@ -230,7 +238,7 @@ class Scene:
                 raise SceneError(f"{place}.{key}: must be given")
         a = self._find(f"{place}.body_a", data["body_a"])
         b = self._find(f"{place}.body_b", data["body_b"])
-        return Joint(a, b, tuple(map(float, data["anchor"])), name=data.get("name", ""))
+        return Joint(a, b, numbers(f"{place}.anchor", data["anchor"], 2), name=data.get("name", ""))
 
     def _find(self, place, reference):
         """Index of a body given by index or name."""
@@ -239,7 +247,7 @@ class Scene:
             if len(found) != 1:
                 raise SceneError(f"{place}: {len(found)} bodies are named {reference!r}")
             return found[0]
-        if not 0 <= reference < len(self.bodies):
+        if not isinstance(reference, int) or not 0 <= reference < len(self.bodies):
             raise SceneError(f"{place}: there is no body {reference}")
         return int(reference)
 
@@ -256,6 +264,8 @@ def _load_file(path):
         return json.loads(Path(path).read_text(encoding="utf-8"), object_pairs_hook=pairs)
     except json.JSONDecodeError as error:
         raise SceneError(f"{path}: line {error.lineno}, column {error.colno}: {error.msg}") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path}: byte {error.start}: not UTF-8") from None
 
 
 def _shape_list(shape):
@@ -270,11 +280,7 @@ def _body_from_json(place, data):
         raise SceneError(f"{place}.shapes: stands beside shape; keep one of them")
     shapes = [_shapes.from_json(f"{place}.shape", data["shape"])] if "shape" in data else [
         _shapes.from_json(f"{place}.shapes[{k}]", s) for k, s in enumerate(data.get("shapes", ()))]
-    body = Body(shapes, **{key: data[key] for key in _BODY_KEYS if key in data})
-    if body.type not in TYPES:
-        raise SceneError(f"{place}.type: must be one of {', '.join(TYPES)}, is {body.type!r}")
-    body.mass_and_inertia(place)
-    return body
+    return Body(shapes, **{key: data[key] for key in _BODY_KEYS if key in data})
 
 
 def _body_to_json(body):

@@ -68,6 +68,8 @@ def segment(a, b):
 
 def from_json(place, data):
     """The shape of a scene file."""
+    if not isinstance(data, dict):
+        raise SceneError(f"{place}: must be an object {{...}}")
     keys = {"circle": {"radius", "center"}, "hull": {"vertices", "radius"},
             "capsule": {"vertices", "radius"}, "segment": {"vertices"}}
     kind = data.get("type")
