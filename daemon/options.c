@@ -54,14 +54,15 @@ static int names(const char *argument, const char *name)
     return !*a && !*name;
 }
 
-static int parse_number(const option *n, const char *value, int *to, char *text)
+static int parse_number(const option *n, const char *argument, const char *value, int *to,
+                        char *text)
 {
     char *end = NULL;
     errno = 0;
     const long x = strtol(value, &end, 10);
     if (end == value || *end || errno || x < n->least || x > INT_MAX) {
-        snprintf(text, CRM_DAEMON_TEXT, "--%s %.100s: a whole number of at least %d is needed",
-                 n->name, value, n->least);
+        snprintf(text, CRM_DAEMON_TEXT, "%s %.100s: a whole number of at least %d is needed",
+                 argument, value, n->least);
         return 0;
     }
     *to = (int)x;
@@ -93,7 +94,7 @@ static int parse_one(crm_options *o, const char *name, const char *value, char *
     }
     for (int i = 0; i < N_NUMBERS; i++) {
         if (names(name, numbers[i].name)) {
-            return parse_number(&numbers[i], value, number_of(o, &numbers[i]), text);
+            return parse_number(&numbers[i], name, value, number_of(o, &numbers[i]), text);
         }
     }
     snprintf(text, CRM_DAEMON_TEXT, "unknown option '%.100s'; see caromd --help", name);

@@ -42,7 +42,7 @@ void program_write(const char *name, const char *text)
 program_call program_run(const char *arguments)
 {
     char command[2048] = "";
-    snprintf(command, sizeof command, "cd %s && %s ", folder, CAROM_PROGRAM);
+    snprintf(command, sizeof command, "cd %s || exit 99; %s ", folder, CAROM_PROGRAM);
     for (const char *c = arguments; *c; c++) {
         const char one[2] = {*c, '\0'};
         strcat(command, *c == '%' ? TEST_DATA : one);
