@@ -110,6 +110,9 @@ void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, cons
 void crm_targets_vjp(crm_reverse *r, const crm_substep *s, const double *v, double *v_bar,
                      double *gap_bar, double *h_bar, int with_parameters);
 
+/* q' = q + d(q): the frictionless problem of a position correction. */
+carom_status crm_correction_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, double *q_bar,
+                                int with_parameters);
 /* Restitution of a contact: e_bar to both bodies. */
 void crm_restitution_vjp(crm_reverse *r, const crm_substep *s, const crm_contact *c, double e_bar);
 

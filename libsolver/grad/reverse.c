@@ -139,9 +139,8 @@ void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, cons
     }
 }
 
-/* q' = q + d(q): the frictionless problem of a position correction. */
-static carom_status correction_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c,
-                                   double *q_bar, int with_parameters)
+carom_status crm_correction_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, double *q_bar,
+                                int with_parameters)
 {
     const carom_status e = crm_solve_vjp(r, s, c, q_bar);
     if (e < 0) return e;
@@ -168,7 +167,7 @@ carom_status crm_euler_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double
     const crm_solve *c = &s->solve[0];
     *h_bar = 0;
     for (int k = s->n_solves - 1; k > 0; k--) {
-        const carom_status e = correction_vjp(r, s, &s->solve[k], q_bar, with_parameters);
+        const carom_status e = crm_correction_vjp(r, s, &s->solve[k], q_bar, with_parameters);
         if (e < 0) return e;
     }
     crm_move_vjp(r->world, s, c->v, q_bar, v_bar, h_bar);

@@ -190,6 +190,9 @@ carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, doubl
         e = stage_2_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
         crm_zero(r->world, v_bar);
     }
+    for (int k = s->n_solves - 1; e >= 0 && k > 1; k--) {
+        e = crm_correction_vjp(r, s, &s->solve[k], q_bar, with_parameters);
+    }
     crm_move_vjp(r->world, s, s->solve[0].v, q_bar, r->solve_bar, h_bar);
     const double first = largest(r->world, r->solve_bar);
     for (int k = 0; e >= 0 && k < MAX_PASSES; k++) {

@@ -76,10 +76,15 @@ static void set_sides(const carom_world *w, const crm_substep *s, crm_solve *c)
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = w->rows.error[k];
 }
 
-/* One correction at c->q, rows in place: displacement, modes, and the multipliers added. */
+/* One correction at c->q, rows in place: displacement, modes, and the multipliers added to those of
+ * an Euler step; in a smooth one nothing is held from both sides, and there is nothing to add to. */
 static carom_status correct(carom_world *w, crm_substep *s, crm_solve *c)
 {
     const crm_solve *step = &s->solve[0];
+    if (s->map == CRM_MAP_SMOOTH) {
+        memset(w->rows.u, 0, 3 * (size_t)w->island->n_bodies * sizeof(double));
+        return crm_solve_run(w, s, c, 1);
+    }
     for (int again = 1; again;) {
         withdraw(w, s);
         const carom_status e = crm_solve_run(w, s, c, 1);
@@ -105,33 +110,39 @@ static void correct_nothing(const carom_world *w, const crm_substep *s, crm_solv
     }
 }
 
-carom_status crm_project(carom_world *w, crm_substep *s)
+static void guess_modes(const crm_substep *s, crm_solve *c, int first)
+{
+    for (int i = 0; i < s->n_contacts; i++) {
+        const int closed = s->pressing[i] || (!first && c[-1].mode[i]);
+        c->mode[i] = closed ? CAROM_STICK : CAROM_SEPARATED;
+    }
+}
+
+carom_status crm_project(carom_world *w, crm_substep *s, int first)
 {
     const double tol = POSITION_TOL * w->length + crm_rounding(w);
     if (!s->n_contacts && !w->island->n_joints) return CAROM_OK;
-    for (int k = 1; k <= CRM_MAX_CORRECTIONS; k++) {
+    for (int k = first; k < first + CRM_MAX_CORRECTIONS; k++) {
         crm_solve *c = &s->solve[k];
         crm_rows_at(w, s, s->q1);
         const double worst = violation(w, s);
-        if (k > 1 && worst <= tol) break;
+        if (k > first && worst <= tol) return CAROM_OK;
         c->kind = CRM_CORRECTION;
         crm_copy(w, c->q, s->q1);
         set_sides(w, s, c);
-        for (int i = 0; i < s->n_contacts; i++) {
-            const int closed = s->pressing[i] || (k > 1 && c[-1].mode[i]);
-            c->mode[i] = closed ? CAROM_STICK : CAROM_SEPARATED;
-        }
+        guess_modes(s, c, k == first);
         if (worst <= tol) {
             correct_nothing(w, s, c);
             s->n_solves = k + 1;
-            break;
+            return CAROM_OK;
         }
         const carom_status e = correct(w, s, c);
         if (e < 0) return e == CAROM_E_MEMORY ? e : CAROM_LIMIT;
         s->n_solves = k + 1;
         crm_move(w, s->q1, c->v, 1);
     }
-    return CAROM_OK;
+    crm_rows_at(w, s, s->q1);
+    return violation(w, s) > w->settings.penetration * w->length ? CAROM_LIMIT : CAROM_OK;
 }
 
 carom_status crm_euler(carom_world *w, double h)
@@ -151,5 +162,5 @@ carom_status crm_euler(carom_world *w, double h)
     crm_copy(w, s->q1, s->q0);
     crm_move(w, s->q1, c->v, h);
     mark_pressing(s);
-    return crm_project(w, s);
+    return crm_project(w, s, 1);
 }

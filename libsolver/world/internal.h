@@ -9,9 +9,11 @@
 
 #include <math.h>
 
-/* Corrections after an Euler step: four reach rounding level from 1e-2. */
-#define CRM_MAX_CORRECTIONS 4
-#define CRM_MAX_SOLVES      (1 + CRM_MAX_CORRECTIONS)
+/* Position corrections of a sub-step: four reach rounding level from 1e-2; a light link between heavy
+ * ones that turns far needs more. */
+#define CRM_MAX_CORRECTIONS 8
+/* Of a sub-step the first one or two are the map's, the rest corrections. */
+#define CRM_MAX_SOLVES (2 + CRM_MAX_CORRECTIONS)
 /* A pair whose gap is below this touches [L]. */
 #define CRM_HIT_TOL 1e-12
 /* Approach below this is rest [fastest point of the world]. */
@@ -89,7 +91,7 @@ typedef enum crm_end {
  * the step's own. */
 typedef enum crm_solve_kind {
     CRM_VELOCITY,   /* Euler: v1 from rows at q0 */
-    CRM_CORRECTION, /* Euler: displacement v from rows at q, frictionless */
+    CRM_CORRECTION, /* displacement v from rows at q, frictionless */
     CRM_IMPACT,     /* v1 from v0, no time passes */
     CRM_STAGE_1, /* smooth: velocity over the sub-step, rows at q0, right-hand sides at its end */
     CRM_STAGE_2, /* smooth: v1 from rows at q1 */
@@ -259,6 +261,7 @@ struct carom_world {
     crm_islands islands;      /* of the frame under way */
     const crm_island *island; /* under way */
     int n_substeps;           /* of the island in this frame */
+    int n_impacts;            /* of the island since time last passed */
     crm_touches touches, next;
     int first_touch;        /* of the island, in next */
     double *joint_force[2]; /* per joint row: as crm_touch.force_n [N] */
@@ -421,11 +424,13 @@ void crm_touches_turn(carom_world *w);
 /* The maps: from (q0, v0) of w->sub to (q1, v1). */
 carom_status crm_euler(carom_world *w, double h);  /* euler.c */
 carom_status crm_smooth(carom_world *w, double h); /* smooth.c */
-carom_status crm_impact(carom_world *w);           /* smooth.c */
+/* smooth.c; plastic: without restitution, CAROM_LIMIT. */
+carom_status crm_impact(carom_world *w, int plastic);
 /* euler.c or smooth.c, as sealed. */
 carom_status crm_map_run(carom_world *w, double h);
-/* Corrects sub.q1 until no contact of sub overlaps and no joint drifts. */
-carom_status crm_project(carom_world *w, crm_substep *s);
+/* Corrects sub.q1 until no contact of sub overlaps and no joint drifts; the corrections are solves
+ * `first` and on.  CAROM_LIMIT when something is left. */
+carom_status crm_project(carom_world *w, crm_substep *s, int first);
 
 /* smooth.c: whether a contact of sub is hit now; keeps of sub.contacts those of the impact, or
  * those that stay closed in smooth motion. */

@@ -15,7 +15,8 @@ typedef struct watch {
     carom_pair pair;
     int by_recipe;
     carom_recipe recipe;
-    int opened;  /* 1: touching at q0 and opening; g is then gap / h, which has no root at h = 0 */
+    int opened;  /* 1: touching at q0 and opening; g is then (gap - base) / h, without root at 0 */
+    double base; /* of an opened pair the overlap at q0, <= 0 [m] */
     double g0;   /* at q0, > 0; of an opened pair its speed */
     double g1;   /* at q1 */
     double at;   /* fraction of the sub-step where g1 was found: 1, or less after a tunnel */
@@ -35,11 +36,11 @@ static double watch_gap(const carom_world *w, const watch *x, const double *q)
     return c.gap;
 }
 
-/* What is located: the gap, or gap / h of a pair that opened at h = 0. */
+/* What is located: the gap, or (gap - base) / h of a pair that opened at h = 0. */
 static double watch_value(const carom_world *w, const watch *x, const double *q, double h)
 {
     const double gap = watch_gap(w, x, q);
-    return x->opened ? gap / h : gap;
+    return x->opened ? (gap - x->base) / h : gap;
 }
 
 /* Fills g0 from q0: the gap, or of a closed pair that opens its speed. */
@@ -65,8 +66,9 @@ static void watch_start(const carom_world *w, watch *x)
         return;
     }
     x->opened = 1;
+    x->base = fmin(x->g0, 0);
     x->g0 = opening;
-    x->g1 /= s->h * x->at;
+    x->g1 = (x->g1 - x->base) / (s->h * x->at);
 }
 
 /* Of two watched gaps the one whose straight line meets zero first. */
@@ -93,7 +95,7 @@ static void consider(search *f, const watch *x)
     watch y = *x;
     y.touches = x->g1 >= -f->tol;
     watch_start(f->w, &y);
-    if (!(y.g0 > 0) || (y.touches && y.opened)) return;
+    if (!(y.g0 > 0) || !(y.g1 <= f->hit) || (y.touches && y.opened)) return;
     if (!f->any || earlier(&y, &f->best)) f->best = y;
     f->any++;
 }
@@ -129,7 +131,7 @@ static void consider_features(search *f, carom_pair pair, int k)
     for (int i = 0; i < m.count; i++) {
         const crm_contact c = crm_contact_of(f->w, pair, &m, i, s->q1);
         if (held_recipe(s, k, pair, c.recipe)) continue;
-        const watch x = {pair, 1, c.recipe, 0, 0, c.gap, 1, 0};
+        const watch x = {pair, 1, c.recipe, 0, 0, 0, c.gap, 1, 0};
         consider(f, &x);
     }
 }
@@ -155,7 +157,7 @@ static int samples(const carom_world *w, carom_pair pair)
 static void consider_pair(search *f, carom_pair pair)
 {
     const crm_substep *s = &f->w->sub;
-    watch x = {pair, 0, {0}, 0, 0, 0, 1, 0};
+    watch x = {pair, 0, {0}, 0, 0, 0, 0, 1, 0};
     const int n = samples(f->w, pair);
     for (int i = 1; i < n; i++) {
         const double at = (double)i / n;
@@ -180,7 +182,7 @@ static void first_closed(carom_world *w, watch *found, int *any)
                 w->settings.penetration * w->length + noise,
                 CRM_HIT_TOL * w->length + noise,
                 0,
-                {{0, 0}, 0, {0}, 0, 0, 0, 1, 0}};
+                {{0, 0}, 0, {0}, 0, 0, 0, 0, 1, 0}};
     int cursor = 0;
     for (int k = 0; k < w->island->n_pairs; k++) {
         const carom_pair pair = w->island->pairs[k];
@@ -205,7 +207,8 @@ static carom_status find_root(carom_world *w, const watch *x, double *h)
     double gb = x->g1;
     int side = 0;
     for (int i = 0; i < MAX_ROOT_STEPS; i++) {
-        const double t = i < MAX_ROOT_STEPS / 2 ? (a * gb - b * ga) / (gb - ga) : 0.5 * (a + b);
+        double t = i < MAX_ROOT_STEPS / 2 ? (a * gb - b * ga) / (gb - ga) : 0.5 * (a + b);
+        if (!(t > a && t < b)) t = 0.5 * (a + b);
         const carom_status e = crm_map_run(w, t);
         if (e < 0) return e;
         *h = t;
@@ -251,12 +254,18 @@ static int same_watch(const watch *x, const watch *y)
            (!x->by_recipe || crm_recipe_same(x->recipe, y->recipe));
 }
 
-/* From a closed gap at h to the earliest event.  With no root that can be named the sub-step ends
- * at a constant fraction of the time left. */
+static void end_at_fraction(crm_substep *s, double left)
+{
+    s->end = CRM_END_FRACTION;
+    s->fraction = s->h / left;
+}
+
+/* From a closed gap within the present sub-step to the earliest event.  With no root that can be
+ * named the sub-step ends at a constant fraction of the time left. */
 static carom_status go_to_event(carom_world *w, watch x, double left)
 {
     crm_substep *s = &w->sub;
-    double h = left * x.at;
+    double h = s->h * x.at;
     for (int round = 0; round < MAX_ROUNDS; round++) {
         watch next;
         int any;
@@ -267,22 +276,22 @@ static carom_status go_to_event(carom_world *w, watch x, double left)
         x = next;
         h *= next.at;
     }
-    if (!set_event(w, &x)) {
-        s->end = CRM_END_FRACTION;
-        s->fraction = h / left;
-    }
+    if (!set_event(w, &x)) end_at_fraction(s, left);
     return CAROM_OK;
 }
 
-/* A sub-step without a solution is tried at half its length, four levels deep. */
-static carom_status halve(carom_world *w, double left, carom_status failed)
+static int unsolved(carom_status e)
 {
-    crm_substep *s = &w->sub;
-    s->fraction = 1;
+    return e == CAROM_E_NO_SOLUTION || e == CAROM_E_INFEASIBLE;
+}
+
+/* A sub-step of length h without a solution is tried at half its length, four levels deep. */
+static carom_status halve(carom_world *w, double h, double left, carom_status failed)
+{
     for (int k = 0; k < MAX_HALVINGS; k++) {
-        s->fraction *= 0.5;
-        const carom_status e = crm_map_run(w, s->fraction * left);
-        s->end = CRM_END_FRACTION;
+        h *= 0.5;
+        const carom_status e = crm_map_run(w, h);
+        end_at_fraction(&w->sub, left);
         if (e >= 0) return e;
     }
     return failed;
@@ -292,28 +301,29 @@ carom_status crm_run_through(carom_world *w, double left)
 {
     w->sub.end = CRM_END_FRAME;
     const carom_status e = crm_map_run(w, left);
-    return e == CAROM_E_NO_SOLUTION || e == CAROM_E_INFEASIBLE ? halve(w, left, e) : e;
+    return unsolved(e) ? halve(w, left, left, e) : e;
 }
 
 carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
 {
-    *busy = 0;
     crm_substep *s = &w->sub;
     carom_status e = crm_run_through(w, left);
-    if (e < 0 || s->end != CRM_END_FRAME) return e;
-    watch x;
-    int any;
-    first_closed(w, &x, &any);
-    if (!any) return e;
-    if (any > allowed) {
-        *busy = 1;
-        return CAROM_OK;
+    *busy = 0;
+    for (int k = 0; e >= 0 && k < MAX_HALVINGS; k++) {
+        watch x;
+        int any;
+        first_closed(w, &x, &any);
+        if (!any) return e;
+        *busy = any > allowed;
+        if (*busy) return CAROM_OK;
+        if (x.touches) {
+            set_event(w, &x);
+            return e;
+        }
+        const double h = s->h * x.at;
+        e = go_to_event(w, x, left);
+        if (!unsolved(e)) return e;
+        e = halve(w, h, left, e);
     }
-    if (x.touches) {
-        set_event(w, &x);
-        return CAROM_OK;
-    }
-    e = go_to_event(w, x, left);
-    if (e == CAROM_E_NO_SOLUTION || e == CAROM_E_INFEASIBLE) return halve(w, left, e);
     return e;
 }

@@ -127,7 +127,7 @@ static carom_status project_island(carom_world *w)
     memset(s->pressing, 0, (size_t)s->n_contacts);
     s->map = CRM_MAP_EULER;
     s->h = 0;
-    const carom_status e = crm_project(w, s);
+    const carom_status e = crm_project(w, s, 1);
     if (e >= 0) crm_copy(w, w->q, s->q1);
     return e;
 }

@@ -142,9 +142,25 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
     const carom_status e = crm_solve_run(w, s, c, 1);
     if (e < 0) return e;
-    s->n_solves = 2;
     crm_copy(w, s->v1, c->v);
     return CAROM_OK;
+}
+
+/* Overlap deeper than the margin at q1, which events that nobody located have left, is projected
+ * away: it costs height but gives no speed. */
+static carom_status clear_overlap(carom_world *w, crm_substep *s)
+{
+    const double slop = w->settings.margin * w->length;
+    double deepest = 0;
+    s->n_solves = 2;
+    for (int k = 0; k < s->n_contacts; k++) {
+        crm_contact c = s->contacts[k];
+        crm_contact_refresh(w, s->q1, &c);
+        deepest = fmin(deepest, c.gap);
+    }
+    if (deepest >= -slop) return CAROM_OK;
+    memset(s->pressing, 0, (size_t)s->n_contacts);
+    return crm_project(w, s, 2);
 }
 
 /* c_n of a contact of sub in a bounce: restitution of an approach at q1 that is faster than rest
@@ -195,7 +211,6 @@ static carom_status bounce(carom_world *w, crm_substep *s, int *done)
         if (e >= 0) e = CAROM_RELAXED;
     }
     if (e < 0) return e;
-    s->n_solves = 2;
     crm_copy(w, s->v1, c->v);
     *done = 1;
     return e;
@@ -209,11 +224,15 @@ carom_status crm_smooth(carom_world *w, double h)
     s->restitution = 1;
     int done = 0;
     carom_status e = stage_1(w, s);
-    if (e >= 0 && s->ahead) e = bounce(w, s, &done);
-    return e < 0 || done ? e : stage_2(w, s);
+    if (e < 0) return e;
+    const carom_status cleared = clear_overlap(w, s);
+    if (cleared < 0) return cleared;
+    if (s->ahead) e = bounce(w, s, &done);
+    if (e >= 0 && !done) e = stage_2(w, s);
+    return e < 0 || e > cleared ? e : cleared;
 }
 
-carom_status crm_impact(carom_world *w)
+carom_status crm_impact(carom_world *w, int plastic)
 {
     crm_substep *s = &w->sub;
     crm_solve *c = &s->solve[0];
@@ -225,7 +244,15 @@ carom_status crm_impact(carom_world *w)
     crm_copy(w, c->q, s->q0);
     crm_rows_at(w, s, s->q0);
     crm_free_velocity(w, s, s->v0, 0);
-    const carom_status e = crm_solve_bounce(w, s, c, s->v0);
+    carom_status e;
+    if (plastic) {
+        s->restitution = 0;
+        crm_velocity_targets(w, s, s->v0, c);
+        e = crm_solve_run(w, s, c, 1);
+        if (e >= 0 && e < CAROM_LIMIT) e = CAROM_LIMIT;
+    } else {
+        e = crm_solve_bounce(w, s, c, s->v0);
+    }
     if (e < 0) return e;
     crm_copy(w, s->v1, c->v);
     crm_copy(w, s->q1, s->q0);
