@@ -142,7 +142,12 @@ void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, cons
 carom_status crm_correction_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, double *q_bar,
                                 int with_parameters)
 {
-    const carom_status e = crm_solve_vjp(r, s, c, q_bar);
+    const crm_island *island = r->world->island;
+    for (int i = 0; i < 3 * island->n_bodies; i++) {
+        const int k = 3 * island->bodies[i / 3] + i % 3;
+        r->pose_bar[k] = c->share * q_bar[k];
+    }
+    const carom_status e = crm_solve_vjp(r, s, c, r->pose_bar);
     if (e < 0) return e;
     if (with_parameters) crm_mass_vjp(r);
     crm_rows_vjp(r, s, c, r->bars.cn, r->bars.ce, q_bar, with_parameters);

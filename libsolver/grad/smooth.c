@@ -49,33 +49,39 @@ static void contact_side_vjp(crm_reverse *r, const crm_substep *s, int k, const 
     *h_bar -= cn_bar * (x.gap - s->target[k]) / (s->h * s->h);
     if (s->target[k] != 0) {
         r->gap_bar[k] -= cn_bar / s->h;
-        *h_bar -= cn_bar * w->rest_speed / s->h;
+        *h_bar -= cn_bar * w->recovery / s->h;
     }
     if (ct_bar == 0) return;
     *h_bar -= ct_bar * crm_slip(w, &x, s->q0, p) / (s->h * s->h);
     crm_slip_vjp(r, &x, s->q0, p, ct_bar / s->h, q0_bar, r->pose_bar, with_parameters);
 }
 
-/* c_e = error(p) / h - J_e v of one joint, whose first row in the island is `first`. */
+/* c_e = (error(p) - target) / h - J_e v of one joint, whose first row in the island is `first`;
+ * target = error(q0) -+ recovery h, or 0. */
 static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int first,
-                           const double *v, const double *p, double *v_bar, double *h_bar,
-                           int with_parameters)
+                           const double *v, const double *p, double *v_bar, double *q0_bar,
+                           double *h_bar, int with_parameters)
 {
     const carom_world *w = r->world;
     const crm_joint *j = &w->joints[joint];
     double je[6 * CRM_MAX_JOINT_ROWS];
     double error[CRM_MAX_JOINT_ROWS];
     double error_bar[CRM_MAX_JOINT_ROWS];
+    double start_bar[CRM_MAX_JOINT_ROWS];
     crm_joint_rows(j, p, je, error);
     for (int i = 0; i < j->n_rows; i++) {
         const int row = first + i;
         const double ce_bar = r->bars.ce[row];
         add_row(v_bar, j->body_a, j->body_b, &w->rows.je[6 * row], -ce_bar);
         add_outer(&r->bars.je[6 * row], j->body_a, j->body_b, v, -ce_bar);
+        const double target = s->joint_target[row];
         error_bar[i] = ce_bar / s->h;
-        *h_bar -= ce_bar * error[i] / (s->h * s->h);
+        start_bar[i] = target != 0 ? -ce_bar / s->h : 0;
+        *h_bar -= ce_bar * (error[i] - target) / (s->h * s->h);
+        if (target != 0) *h_bar += ce_bar * copysign(w->recovery, target) / s->h;
     }
     crm_joint_vjp(r, p, joint, NULL, error_bar, r->pose_bar, with_parameters);
+    crm_joint_vjp(r, s->q0, joint, NULL, start_bar, q0_bar, with_parameters);
 }
 
 /* Right-hand sides from the velocity v of the fixed point, which ends at p = q0 + h v. */
@@ -94,7 +100,7 @@ static void sides_vjp(crm_reverse *r, const crm_substep *s, const double *v, dou
     int row = 0;
     for (int k = 0; k < w->island->n_joints; k++) {
         const int joint = w->island->joints[k];
-        joint_side_vjp(r, s, joint, row, v, p, v_bar, h_bar, with_parameters);
+        joint_side_vjp(r, s, joint, row, v, p, v_bar, q0_bar, h_bar, with_parameters);
         row += w->joints[joint].n_rows;
     }
     crm_move_vjp(w, s, v, r->pose_bar, v_bar, h_bar);

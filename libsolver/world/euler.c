@@ -6,6 +6,8 @@
 
 /* Position errors below this are left alone [L]; rounding of far coordinates is added. */
 static const double POSITION_TOL = 1e-13;
+/* Shares of a correction that are tried. */
+enum { MAX_SHARES = 8 };
 
 /* Contacts that pressed and did not bounce. */
 static void mark_pressing(crm_substep *s)
@@ -77,7 +79,8 @@ static void set_sides(const carom_world *w, const crm_substep *s, crm_solve *c)
 }
 
 /* One correction at c->q, rows in place: displacement, modes, and the multipliers added to those of
- * an Euler step; in a smooth one nothing is held from both sides, and there is nothing to add to. */
+ * an Euler step; in a smooth one nothing is held from both sides, and there is nothing to add to.
+ */
 static carom_status correct(carom_world *w, crm_substep *s, crm_solve *c)
 {
     const crm_solve *step = &s->solve[0];
@@ -110,6 +113,23 @@ static void correct_nothing(const carom_world *w, const crm_substep *s, crm_solv
     }
 }
 
+/* q1 = q + share v with the largest share of 1, 1/2, ... that does not make it worse; 0 when none
+ * does.  Leaves the rows at q1. */
+static int take_share(carom_world *w, crm_substep *s, crm_solve *c, double worst)
+{
+    c->share = 1;
+    for (int k = 0; k < MAX_SHARES; k++) {
+        crm_copy(w, s->q1, c->q);
+        crm_move(w, s->q1, c->v, c->share);
+        crm_rows_at(w, s, s->q1);
+        if (violation(w, s) <= worst) return 1;
+        c->share *= 0.5;
+    }
+    crm_copy(w, s->q1, c->q);
+    crm_rows_at(w, s, s->q1);
+    return 0;
+}
+
 static void guess_modes(const crm_substep *s, crm_solve *c, int first)
 {
     for (int i = 0; i < s->n_contacts; i++) {
@@ -124,9 +144,10 @@ carom_status crm_project(carom_world *w, crm_substep *s, int first)
     if (!s->n_contacts && !w->island->n_joints) return CAROM_OK;
     for (int k = first; k < first + CRM_MAX_CORRECTIONS; k++) {
         crm_solve *c = &s->solve[k];
-        crm_rows_at(w, s, s->q1);
+        if (k == first) crm_rows_at(w, s, s->q1);
         const double worst = violation(w, s);
         if (k > first && worst <= tol) return CAROM_OK;
+        c->share = 1;
         c->kind = CRM_CORRECTION;
         crm_copy(w, c->q, s->q1);
         set_sides(w, s, c);
@@ -138,10 +159,9 @@ carom_status crm_project(carom_world *w, crm_substep *s, int first)
         }
         const carom_status e = correct(w, s, c);
         if (e < 0) return e == CAROM_E_MEMORY ? e : CAROM_LIMIT;
+        if (!take_share(w, s, c, worst)) break;
         s->n_solves = k + 1;
-        crm_move(w, s->q1, c->v, 1);
     }
-    crm_rows_at(w, s, s->q1);
     return violation(w, s) > w->settings.penetration * w->length ? CAROM_LIMIT : CAROM_OK;
 }
 

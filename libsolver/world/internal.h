@@ -9,8 +9,8 @@
 
 #include <math.h>
 
-/* Position corrections of a sub-step: four reach rounding level from 1e-2; a light link between heavy
- * ones that turns far needs more. */
+/* Position corrections of a sub-step: four reach rounding level from 1e-2; a light link between
+ * heavy ones that turns far needs more. */
 #define CRM_MAX_CORRECTIONS 8
 /* Of a sub-step the first one or two are the map's, the rest corrections. */
 #define CRM_MAX_SOLVES (2 + CRM_MAX_CORRECTIONS)
@@ -102,6 +102,7 @@ typedef struct crm_solve {
     crm_solve_kind kind;
     double *q;           /* 3 n_bodies: where the rows are */
     double *v;           /* 3 n_bodies: the solution, zero for static bodies */
+    double share;        /* of a correction: how much of it was taken, 1 or less */
     double *cn;          /* per contact */
     double *ct;          /* per contact */
     double *ln;          /* per contact */
@@ -128,6 +129,7 @@ typedef struct crm_substep {
     crm_contact *moved;      /* the same contacts at the pose of the problem under way */
     unsigned char *pressing; /* per contact: closed by force, so held at gap 0 from both sides */
     double *target;          /* per contact: gap that stage 1 aims at [m] */
+    double *joint_target;    /* per joint row: error that stage 1 aims at [m] */
     double restitution;      /* factor on all restitutions: 1, or 0 when relaxed */
     int ahead;               /* 1: contacts are all that may close; impacts are not located */
     int n_solves;
@@ -243,6 +245,7 @@ struct carom_world {
     int smooth;        /* 1: two-stage map; 0: Euler */
     double speed;      /* sqrt(g L) [m/s] */
     double rest_speed; /* v_rest [m/s] */
+    double recovery;   /* errors of position are recovered no faster [m/s] */
     void *seal_block;  /* the arrays made by seal */
     size_t seal_bytes;
     double *step_force; /* 3 n_bodies: of the present step, constant + given */
@@ -454,8 +457,11 @@ carom_vec2 crm_centers(const carom_world *w, const crm_contact *c, const double 
 /* slip.c: arc length that body B slips on body A along the tangent of a contact, from q0 to q1. */
 double crm_slip(const carom_world *w, const crm_contact *c, const double *q0, const double *q1);
 
-/* locate.c: S(left), or S of a fraction of it when that has no solution. */
+/* locate.c: S(left), or S of a fraction of it when that has no solution, or the Euler map. */
 carom_status crm_run_through(carom_world *w, double left);
+/* A sub-step whose contacts lie ahead knows them by the features at its start, which a fast body
+ * may pass: then it ends where they meet instead. */
+carom_status crm_stop_passing(carom_world *w, double left);
 /* Runs S on (0, left]; when a contact outside sub.contacts closes on the way, ends at the
  * first such event; when more than `allowed` do, *busy = 1 and nothing counts. */
 carom_status crm_locate(carom_world *w, double left, int allowed, int *busy);

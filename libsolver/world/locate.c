@@ -6,6 +6,8 @@
 
 /* The root of a gap is found to this [L]; rounding of far coordinates is added. */
 static const double ROOT_TOL = 1e-13;
+/* Overlap that counts as passing through [thickness of both]. */
+static const double DEEP = 0.1;
 /* Illinois steps for one root, rounds over several roots, halvings of a failed sub-step. */
 enum { MAX_ROOT_STEPS = 60, MAX_ROUNDS = 20, MAX_HALVINGS = 4, MAX_SAMPLES = 64 };
 
@@ -297,11 +299,53 @@ static carom_status halve(carom_world *w, double h, double left, carom_status fa
     return failed;
 }
 
+/* Where the smooth map has no solution at any length that was tried, the Euler map may have one. */
+static carom_status run_euler(carom_world *w, double left, carom_status failed)
+{
+    if (!w->smooth) return failed;
+    w->sub.end = CRM_END_FRAME;
+    const carom_status e = crm_euler(w, left);
+    return e < 0 ? failed : e < CAROM_LIMIT ? CAROM_LIMIT : e;
+}
+
 carom_status crm_run_through(carom_world *w, double left)
 {
     w->sub.end = CRM_END_FRAME;
-    const carom_status e = crm_map_run(w, left);
-    return unsolved(e) ? halve(w, left, left, e) : e;
+    carom_status e = crm_map_run(w, left);
+    if (unsolved(e)) e = halve(w, left, left, e);
+    return unsolved(e) ? run_euler(w, left, e) : e;
+}
+
+/* Of a pair that moves by more than its thickness: whether it overlaps by a part of that on its
+ * way; x is then where. */
+static int passes(const carom_world *w, carom_pair pair, watch *x)
+{
+    const crm_substep *s = &w->sub;
+    const double deep = -DEEP * (w->shapes[pair.a].thickness + w->shapes[pair.b].thickness);
+    const int n = samples(w, pair);
+    for (int i = 1; n > 1 && i <= n; i++) {
+        x->at = (double)i / n;
+        x->g1 = crm_distance_between(w, pair, s->q0, s->q1, x->at);
+        if (x->g1 < deep) return 1;
+    }
+    return 0;
+}
+
+carom_status crm_stop_passing(carom_world *w, double left)
+{
+    watch first = {{0, 0}, 0, {0}, 0, 0, 0, 0, 2, 0};
+    for (int k = 0; k < w->island->n_pairs; k++) {
+        watch x = {w->island->pairs[k], 0, {0}, 0, 0, 0, 0, 1, 0};
+        if (!passes(w, x.pair, &x) || x.at >= first.at) continue;
+        watch_start(w, &x);
+        if (x.g0 > 0 && !x.opened) first = x;
+    }
+    if (first.at > 1) return CAROM_OK;
+    double h = w->sub.h * first.at;
+    carom_status e = find_root(w, &first, &h);
+    if (e < 0) return e;
+    if (!set_event(w, &first)) end_at_fraction(&w->sub, left);
+    return CAROM_OK;
 }
 
 carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)

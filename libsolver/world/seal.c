@@ -66,6 +66,7 @@ static void set_scales(carom_world *w)
     const double g = hypot(w->settings.gravity[0], w->settings.gravity[1]);
     w->speed = sqrt(g * w->length);
     w->rest_speed = w->settings.rest_speed * w->speed;
+    w->recovery = fmax(w->rest_speed, w->settings.margin * w->length / w->settings.dt);
 }
 
 static void count_moving(carom_world *w)

@@ -13,13 +13,18 @@ enum { MAX_NEWTON = 30 };
 static const double LOOSE = 1e3;
 static const double FAR = 1e2;
 
-/* Stage 1 aims at gap 0; from a deeper overlap it recovers at v_rest, not at gap / h, which in a
- * short sub-step would be a kick. */
+/* Stage 1 aims at gap 0 and joint error 0; from farther off it goes there at no more than the
+ * recovery speed, not at error / h, which in a short sub-step would be a kick.  Rows at q0. */
 static void set_targets(const carom_world *w, crm_substep *s)
 {
+    const double most = w->recovery * s->h;
     for (int k = 0; k < s->n_contacts; k++) {
         const double gap = s->contacts[k].gap;
-        s->target[k] = gap < -w->rest_speed * s->h ? gap + w->rest_speed * s->h : 0;
+        s->target[k] = gap < -most ? gap + most : 0;
+    }
+    for (int k = 0; k < w->island->n_rows; k++) {
+        const double error = w->rows.error[k];
+        s->joint_target[k] = error > most ? error - most : error < -most ? error + most : 0;
     }
 }
 
@@ -29,7 +34,9 @@ static void first_sides(const carom_world *w, const crm_substep *s, crm_solve *c
         c->cn[k] = (s->contacts[k].gap - s->target[k]) / s->h;
         c->ct[k] = 0;
     }
-    for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = w->rows.error[k] / s->h;
+    for (int k = 0; k < w->island->n_rows; k++) {
+        c->ce[k] = (w->rows.error[k] - s->joint_target[k]) / s->h;
+    }
 }
 
 /* Right-hand sides of joint j in the next iteration; `first` is its first row in the island. */
@@ -43,7 +50,7 @@ static double next_joint_sides(const carom_world *w, const crm_substep *s, const
     for (int k = 0; k < j->n_rows; k++) {
         const int row = first + k;
         const double u = crm_row_dot(&w->rows.je[6 * row], c->v, j->body_a, j->body_b);
-        next->ce[row] = error[k] / s->h - u;
+        next->ce[row] = (error[k] - s->joint_target[row]) / s->h - u;
         largest = fmax(largest, s->h * fabs(next->ce[row] - c->ce[row]));
     }
     return largest;
@@ -146,19 +153,22 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
     return CAROM_OK;
 }
 
-/* Overlap deeper than the margin at q1, which events that nobody located have left, is projected
- * away: it costs height but gives no speed. */
-static carom_status clear_overlap(carom_world *w, crm_substep *s)
+/* Overlap and joint errors beyond the margin at q1, which events that nobody located and sub-steps
+ * without a solution have left, are projected away: that costs height but gives no speed. */
+static carom_status clear_errors(carom_world *w, crm_substep *s)
 {
     const double slop = w->settings.margin * w->length;
-    double deepest = 0;
+    double worst = 0;
     s->n_solves = 2;
     for (int k = 0; k < s->n_contacts; k++) {
         crm_contact c = s->contacts[k];
         crm_contact_refresh(w, s->q1, &c);
-        deepest = fmin(deepest, c.gap);
+        worst = fmax(worst, -c.gap);
     }
-    if (deepest >= -slop) return CAROM_OK;
+    for (int k = 0; k < w->island->n_rows; k++) {
+        worst = fmax(worst, fabs(s->joint_target[k]));
+    }
+    if (worst <= slop) return CAROM_OK;
     memset(s->pressing, 0, (size_t)s->n_contacts);
     return crm_project(w, s, 2);
 }
@@ -225,7 +235,7 @@ carom_status crm_smooth(carom_world *w, double h)
     int done = 0;
     carom_status e = stage_1(w, s);
     if (e < 0) return e;
-    const carom_status cleared = clear_overlap(w, s);
+    const carom_status cleared = clear_errors(w, s);
     if (cleared < 0) return cleared;
     if (s->ahead) e = bounce(w, s, &done);
     if (e >= 0 && !done) e = stage_2(w, s);

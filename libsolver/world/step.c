@@ -9,8 +9,8 @@ static const double CARRY_TOL = 1e-13;
 enum { BODY_SUBSTEPS = 128, MAX_SUBSTEPS = 256 };
 /* How often pairs are looked for again when bodies leave the room foreseen for them. */
 enum { MAX_WIDENINGS = 4 };
-/* Impacts without time between them, after which all that touches stops approaching at once: a light
- * body between two heavy ones is hit sqrt(mass ratio) times. */
+/* Impacts without time between them, after which all that touches stops approaching at once: a
+ * light body between two heavy ones is hit sqrt(mass ratio) times. */
 enum { MAX_IMPACTS = 32 };
 
 static void begin_substep(carom_world *w)
@@ -83,6 +83,10 @@ static carom_status run_last(carom_world *w, double left)
     if (e < 0) return e;
     crm_guess_load(w, left);
     e = crm_run_through(w, left);
+    if (e >= 0 && w->n_substeps + 1 < w->settings.max_substeps) {
+        const carom_status stopped = crm_stop_passing(w, left);
+        if (stopped) e = stopped;
+    }
     const int asked = w->settings.integrator != CAROM_FIXED;
     return e >= 0 && e < CAROM_LIMIT && asked && met_ahead(&w->sub) ? CAROM_LIMIT : e;
 }

@@ -31,6 +31,7 @@ static void lay_states(const carom_world *w, int n, crm_block *b, void *object)
     s->v0 = crm_carve(b, n3, sizeof(double));
     s->q1 = crm_carve(b, n3, sizeof(double));
     s->v1 = crm_carve(b, n3, sizeof(double));
+    s->joint_target = crm_carve(b, rows, sizeof(double));
     for (int k = 0; k < CRM_MAX_SOLVES; k++) {
         crm_solve *c = &s->solve[k];
         c->q = crm_carve(b, n3, sizeof(double));
