@@ -159,8 +159,9 @@ static void bounce_side_vjp(crm_reverse *r, const crm_substep *s, int k, double 
     const crm_contact *x = &s->moved[k];
     const double cn = s->solve[1].cn[k];
     const double cn_bar = r->bars.cn[k];
-    r->gap_bar[k] = cn > 0 ? cn_bar / s->h : 0;
-    if (cn > 0) *h_bar -= cn_bar * cn / s->h;
+    const int open = x->gap > w->settings.margin * w->length;
+    r->gap_bar[k] = open ? cn_bar / s->h : 0;
+    if (open) *h_bar -= cn_bar * cn / s->h;
     if (cn >= 0) return;
     const double *jn = &w->rows.jn[6 * k];
     const double un = crm_row_dot(jn, s->v0, x->body_a, x->body_b);

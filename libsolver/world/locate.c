@@ -6,6 +6,8 @@
 
 /* The root of a gap is found to this [L]; rounding of far coordinates is added. */
 static const double ROOT_TOL = 1e-13;
+/* An event sooner than that [dt] is none: the gap was closed at the start and nobody knew. */
+static const double NO_TIME = 1e-13;
 /* Overlap that counts as passing through [thickness of both]. */
 static const double DEEP = 0.1;
 /* Illinois steps for one root, rounds over several roots, halvings of a failed sub-step. */
@@ -366,6 +368,7 @@ carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
         }
         const double h = s->h * x.at;
         e = go_to_event(w, x, left);
+        *busy = e >= 0 && s->h < NO_TIME * w->settings.dt;
         if (!unsolved(e)) return e;
         e = halve(w, h, left, e);
     }

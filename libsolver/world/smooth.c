@@ -173,15 +173,29 @@ static carom_status clear_errors(carom_world *w, crm_substep *s)
     return crm_project(w, s, 2);
 }
 
+/* Fastest point of a body of the island [m/s]. */
+static double top_speed(const carom_world *w, const double *v)
+{
+    double top = 0;
+    for (int k = 0; k < w->island->n_bodies; k++) {
+        const int b = w->island->bodies[k];
+        const double *vb = v + 3 * b;
+        top = fmax(top, hypot(vb[1], vb[2]) + fabs(vb[0]) * w->bodies[b].reach);
+    }
+    return top;
+}
+
 /* c_n of a contact of sub in a bounce: restitution of an approach at q1 that is faster than rest
- * and than what gravity does in a sub-step; or gap / h where it is still open. */
-static double bounce_side(const carom_world *w, const crm_substep *s, int k)
+ * and than what gravity does in a sub-step; gap / h where it is still open.  One that opens is let
+ * alone: with others that bounce it would be driven, and give energy. */
+static double bounce_side(const carom_world *w, const crm_substep *s, int k, double apart)
 {
     const crm_contact *c = &s->moved[k];
     const double g = hypot(w->settings.gravity[0], w->settings.gravity[1]);
     const double slop = w->settings.margin * w->length;
     if (c->gap > slop) return c->gap / s->h;
     const double un = crm_row_dot(&w->rows.jn[6 * k], s->v0, c->body_a, c->body_b);
+    if (un > w->rest_speed) return apart;
     if (un >= -fmax(w->rest_speed, 2 * g * s->h)) return 0;
     return s->restitution * un *
            crm_combine(w->settings.combine_restitution, w->restitution[c->body_a],
@@ -191,9 +205,10 @@ static double bounce_side(const carom_world *w, const crm_substep *s, int k)
 /* Right-hand sides of a bounce, rows at q1 in place; 1 when a contact bounces. */
 static int bounce_sides(const carom_world *w, const crm_substep *s, crm_solve *c)
 {
+    const double apart = 4 * top_speed(w, s->v0);
     int any = 0;
     for (int k = 0; k < s->n_contacts; k++) {
-        c->cn[k] = bounce_side(w, s, k);
+        c->cn[k] = bounce_side(w, s, k, apart);
         c->ct[k] = 0;
         c->mode[k] = s->solve[0].mode[k];
         any |= c->cn[k] < 0;
@@ -276,18 +291,6 @@ static double approach(const crm_substep *s, int k)
     const crm_contact *c = &s->contacts[k];
     crm_contact_rows(c, jn, jt);
     return crm_row_dot(jn, s->v0, c->body_a, c->body_b);
-}
-
-/* Fastest point of a body of the island [m/s]. */
-static double top_speed(const carom_world *w, const double *v)
-{
-    double top = 0;
-    for (int k = 0; k < w->island->n_bodies; k++) {
-        const int b = w->island->bodies[k];
-        const double *vb = v + 3 * b;
-        top = fmax(top, hypot(vb[1], vb[2]) + fabs(vb[0]) * w->bodies[b].reach);
-    }
-    return top;
 }
 
 int crm_select_impact(carom_world *w)
