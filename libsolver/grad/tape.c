@@ -63,7 +63,7 @@ static void pack(const crm_island *i, const crm_substep *s, crm_block *b, crm_re
     to->s.v1 = NULL;
     to->s.contacts = keep(b, s->contacts, m, sizeof *s->contacts);
     to->s.target = keep(b, s->target, m, sizeof(double));
-    to->s.joint_target = keep(b, s->joint_target, 2 * (size_t)i->n_joints, sizeof(double));
+    to->s.joint_target = keep(b, s->joint_target, (size_t)i->n_rows, sizeof(double));
     for (int k = 0; k < s->n_solves; k++) keep_solve(i, s, k, b, &to->s.solve[k]);
 }
 
