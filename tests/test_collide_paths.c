@@ -193,13 +193,61 @@ static void thousands_of_vertices(void **state)
     }
 }
 
+static void same_sweep(crm_sweep_function *f, crm_sweep_function *g, const char *way, int k,
+                       const crm_placed *a, const crm_placed *b, double reach)
+{
+    crm_closest x;
+    crm_closest y;
+    f(a, b, reach, 1, &x);
+    g(a, b, reach, 1, &y);
+    expect_same(way, k, &x, &y);
+    assert_true(x.lead == y.lead);
+    if (x.kind == CRM_APART) return;
+    assert_true(x.ref.m.x == y.ref.m.x && x.ref.m.y == y.ref.m.y);
+}
+
+#ifdef CRM_AVX2
+static void check_avx2(int k, int four, const crm_placed *a, const crm_placed *b, double reach)
+{
+    if (!__builtin_cpu_supports("avx2")) return;
+    if (four) same_sweep(crm_sweep_four_avx2, crm_sweep_four, "four, AVX2", k, a, b, reach);
+    same_sweep(crm_sweep_eight_avx2, crm_sweep_eight, "eight, AVX2", k, a, b, reach);
+}
+#else
+static void check_avx2(int k, int four, const crm_placed *a, const crm_placed *b, double reach)
+{
+    (void)k, (void)four, (void)a, (void)b, (void)reach;
+}
+#endif
+
+/* One quad or two, with AVX2 and without: the same bits. */
+static void small_sweeps(void **state)
+{
+    (void)state;
+    rng r = rng_from(4);
+    int n_small = 0;
+    for (int k = 0; k < 40000; k++) {
+        core ca;
+        core cb;
+        crm_placed a;
+        crm_placed b;
+        random_pair(&r, k % 4 == 0, &ca, &cb, &a, &b);
+        if (a.n > CRM_FEW || b.n > CRM_FEW) continue;
+        n_small++;
+        const double reach = k % 3 ? HUGE_VAL : 0.1;
+        const int four = a.n <= 4 && b.n <= 4;
+        if (four) same_sweep(crm_sweep_eight, crm_sweep_four, "four", k, &a, &b, reach);
+        check_avx2(k, four, &a, &b, reach);
+    }
+    assert_true(n_small > 10000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_pairs),
-        cmocka_unit_test(lattice_pairs),
-        cmocka_unit_test(gjk_is_certified),
-        cmocka_unit_test(thousands_of_vertices),
+        cmocka_unit_test(random_pairs),     cmocka_unit_test(lattice_pairs),
+        cmocka_unit_test(gjk_is_certified), cmocka_unit_test(thousands_of_vertices),
+        cmocka_unit_test(small_sweeps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -62,19 +62,6 @@ static int recall_face(const crm_placed *p, int k, const crm_placed *q, int j, i
     return out->gap < -crm_noise(p, k, q, j) && crm_is_lowest(q, j, out->ref.m, 1.0);
 }
 
-static int recall_vertices(const crm_placed *a, int i, const crm_placed *b, int j, crm_closest *out)
-{
-    const carom_vec2 w = crm_between(a, i, b, j);
-    out->kind = CRM_VERTICES;
-    out->a = i;
-    out->b = j;
-    out->tied = 0;
-    out->lead = 0;
-    out->gap = crm_length(w);
-    return out->gap > crm_noise(a, i, b, j) && crm_is_lowest(b, j, w, out->gap) &&
-           crm_is_lowest(a, i, crm_neg(w), out->gap);
-}
-
 /* 1: the cache has the answer. */
 static int recall(const crm_placed *a, const crm_placed *b, const carom_pair_cache *cache,
                   crm_closest *out)
@@ -83,7 +70,7 @@ static int recall(const crm_placed *a, const crm_placed *b, const carom_pair_cac
     const int j = cache->b;
     if (i >= a->n || j >= b->n) return 0;
     switch (cache->kind) {
-    case VERTICES: return recall_vertices(a, i, b, j, out);
+    case VERTICES: return crm_vertices_are_closest(a, i, b, j, out);
     case FACE_A: return recall_face(a, i, b, j, 0, 0, out);
     case FACE_B: return recall_face(b, j, a, i, 1, 0, out);
     case OVERLAP_A:

@@ -129,7 +129,7 @@ static void over_face(const link_view *k, const crm_placed *b, carom_manifold *o
 {
     crm_closest c;
     crm_face_at(&k->p, 0, b, crm_support(b, crm_neg(k->normal)), 0, &c);
-    crm_manifold_of(&k->p, b, &c, HUGE_VAL, out);
+    *out = crm_manifold_of(&k->p, b, &c, HUGE_VAL);
     if (is_off(k, b, out)) out->count = 0;
 }
 
@@ -147,7 +147,7 @@ static void answer(const link_view *k, const crm_placed *b, const crm_closest *c
         over_face(k, b, out);
         return;
     }
-    crm_manifold_of(&k->p, b, c, HUGE_VAL, out);
+    *out = crm_manifold_of(&k->p, b, c, HUGE_VAL);
     if (c->kind == CRM_FACE_A) return;
     if (!may_give(k, c->a, out->normal)) out->count = 0;
     drop_joint(k, out);

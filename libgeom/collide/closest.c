@@ -2,40 +2,6 @@
  * certified axis ends there, and whatever is too close for a certificate is left to the sweep. */
 #include "collide/closest.h"
 
-void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b,
-                 crm_closest *out)
-{
-    out->kind = on_b ? CRM_FACE_B : CRM_FACE_A;
-    out->a = on_b ? j : edge;
-    out->b = on_b ? edge : j;
-    out->tied = 0;
-    out->lead = 0;
-    out->ref = crm_reference_at(p, edge);
-    out->gap = crm_dot(out->ref.m, crm_between(p, edge, q, j));
-}
-
-/* From vertex j of q to its neighbor l, up along d by more than |d| times rounding. */
-static int rises(const crm_placed *q, int j, int l, carom_vec2 d, double length)
-{
-    const carom_vec2 e = crm_turn(q, crm_sub(q->v[l], q->v[j]));
-    return crm_dot(d, e) > crm_noise(q, j, q, l) * length;
-}
-
-int crm_is_lowest(const crm_placed *q, int j, carom_vec2 d, double length)
-{
-    if (q->n == 1) return 1;
-    return rises(q, j, crm_next(q, j), d, length) && rises(q, j, crm_prev(q, j), d, length);
-}
-
-int crm_face_is_closest(const crm_placed *p, int edge, const crm_placed *q, int j,
-                        const crm_closest *c)
-{
-    const double tol = crm_noise(p, edge, q, j);
-    const double along = crm_dot(c->ref.t, crm_between(p, edge, q, j));
-    return c->gap > tol && along > tol && along < c->ref.length - tol &&
-           crm_is_lowest(q, j, c->ref.m, 1.0);
-}
-
 static crm_axis axis_along(const crm_placed *a, const crm_placed *b, carom_vec2 d)
 {
     const crm_axis x = {d, crm_support(a, d), crm_support(b, crm_neg(d))};
@@ -117,6 +83,18 @@ static void walk_lengthwise(const crm_placed *a, const crm_placed *b, double rea
     crm_closest_from(a, b, axis_along(a, b, crm_neg(e)), reach, face);
 }
 
+/* Beside the face: its nearer end, when that proves itself. */
+static int leave_to_vertex(const crm_placed *a, const crm_placed *b, const crm_placed *p, int k,
+                           int j, crm_closest *face)
+{
+    const double along = crm_dot(face->ref.t, face->x);
+    const int end = along > 0.5 * face->ref.length ? crm_next(p, k) : k;
+    crm_closest c;
+    if (!crm_vertices_are_closest(a, p == a ? end : j, b, p == a ? j : end, &c)) return 0;
+    *face = c;
+    return 1;
+}
+
 /* From the face of largest separation to the closest features, if it separates. */
 static void leave_face(const crm_placed *a, const crm_placed *b, double reach, crm_closest *face)
 {
@@ -131,6 +109,7 @@ static void leave_face(const crm_placed *a, const crm_placed *b, double reach, c
             face->tied = 0; /* another face as high is not as close */
             return;
         }
+        if (leave_to_vertex(a, b, p, k, j, face)) return;
         const carom_vec2 m = face->ref.m;
         const crm_axis x = {on_a ? m : crm_neg(m), face->a, face->b};
         const crm_closest known = *face;
@@ -140,6 +119,35 @@ static void leave_face(const crm_placed *a, const crm_placed *b, double reach, c
         walk_lengthwise(a, b, reach, face);
     }
 }
+
+#ifdef CRM_AVX2
+static void sweep_few(const crm_placed *a, const crm_placed *b, double reach, int want_lead,
+                      crm_closest *out)
+{
+    const int four = a->n <= 4 && b->n <= 4;
+    if (__builtin_cpu_supports("avx2")) {
+        if (four) {
+            crm_sweep_four_avx2(a, b, reach, want_lead, out);
+        } else {
+            crm_sweep_eight_avx2(a, b, reach, want_lead, out);
+        }
+    } else if (four) {
+        crm_sweep_four(a, b, reach, want_lead, out);
+    } else {
+        crm_sweep_eight(a, b, reach, want_lead, out);
+    }
+}
+#else
+static void sweep_few(const crm_placed *a, const crm_placed *b, double reach, int want_lead,
+                      crm_closest *out)
+{
+    if (a->n <= 4 && b->n <= 4) {
+        crm_sweep_four(a, b, reach, want_lead, out);
+    } else {
+        crm_sweep_eight(a, b, reach, want_lead, out);
+    }
+}
+#endif
 
 void crm_closest_features(const crm_placed *a, const crm_placed *b, const crm_search *how,
                           crm_closest *out)
@@ -157,7 +165,7 @@ void crm_closest_features(const crm_placed *a, const crm_placed *b, const crm_se
         if (crm_gjk(a, b, x.d, &y) && crm_closest_from(a, b, y, how->reach, out)) return;
     }
     if (few) {
-        crm_sweep_few(a, b, how->reach, out);
+        sweep_few(a, b, how->reach, how->slack > 0, out);
     } else {
         crm_sweep(a, b, &x, how->reach, how->slack, out);
     }

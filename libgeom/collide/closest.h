@@ -3,6 +3,7 @@
 #ifndef CRM_CLOSEST_H
 #define CRM_CLOSEST_H
 
+#include "collide/few/lanes.h"
 #include "collide/placed.h"
 
 typedef enum crm_closest_kind {
@@ -20,6 +21,7 @@ typedef struct crm_closest {
     double gap;        /* signed distance of the cores [m] */
     double lead;       /* of a swept face over the next best one, at least [m] */
     crm_reference ref; /* faces: the edge */
+    carom_vec2 x;      /* faces: from the start of the edge to the other's vertex */
 } crm_closest;
 
 /* Distances below this are rounding [1], times the coordinates they come from [m]. */
@@ -39,9 +41,10 @@ static inline double crm_noise(const crm_placed *p, int i, const crm_placed *q, 
 /* The size of a core's coordinates, by two vertices far from each other [m]. */
 static inline double crm_core_coordinates(const crm_placed *p)
 {
-    const carom_vec2 a = p->v[0];
-    const carom_vec2 b = p->v[p->n / 2];
-    const double x = 0.5 * (fabs(a.x) + fabs(a.y) + fabs(b.x) + fabs(b.y));
+    const crm_lanes a = crm_lanes_abs(crm_lanes_load(&p->v[0].x));
+    const crm_lanes b = crm_lanes_abs(crm_lanes_load(&p->v[p->n >> 1].x));
+    const crm_lanes sum = crm_lanes_add(a, b);
+    const double x = 0.5 * (crm_lanes_first(sum) + crm_lanes_second(sum));
     return x > p->radius ? x : p->radius;
 }
 
@@ -59,17 +62,62 @@ static inline double crm_tie(const crm_placed *a, const crm_placed *b)
 }
 
 /* Edge `edge` of p, vertex j of q; on_b: p is B.  Not tied, no lead. */
-void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b,
-                 crm_closest *out);
+static inline void crm_face_at(const crm_placed *p, int edge, const crm_placed *q, int j, int on_b,
+                               crm_closest *out)
+{
+    out->kind = on_b ? CRM_FACE_B : CRM_FACE_A;
+    out->a = on_b ? j : edge;
+    out->b = on_b ? edge : j;
+    out->tied = 0;
+    out->lead = 0;
+    out->ref = crm_reference_at(p, edge);
+    out->x = crm_between(p, edge, q, j);
+    out->gap = crm_dot(out->ref.m, out->x);
+}
 
 /* Vertex j of q is lower along d (of the given length) than its neighbors by more than rounding:
  * any search finds that one. */
-int crm_is_lowest(const crm_placed *q, int j, carom_vec2 d, double length);
+static inline int crm_is_lowest(const crm_placed *q, int j, carom_vec2 d, double length)
+{
+    if (q->n == 1) return 1;
+    const carom_vec2 u = crm_turn_back(q, d);
+    const carom_vec2 v = q->v[j];
+    const carom_vec2 w = q->v[crm_next(q, j)];
+    const carom_vec2 x = q->v[crm_prev(q, j)];
+    const double size = fabs(v.x) + fabs(v.y);
+    const double tol = CRM_NEAR_TOL * length;
+    const double ahead = crm_dot(u, crm_sub(w, v));
+    const double back = crm_dot(u, crm_sub(x, v));
+    return (ahead > tol * (size + fabs(w.x) + fabs(w.y))) &
+           (back > tol * (size + fabs(x.x) + fabs(x.y)));
+}
 
 /* Apart, at a face: its vertex is clearly the lowest and its foot clearly inside the edge.  Any
  * walk ends there. */
-int crm_face_is_closest(const crm_placed *p, int edge, const crm_placed *q, int j,
-                        const crm_closest *c);
+static inline int crm_face_is_closest(const crm_placed *p, int edge, const crm_placed *q, int j,
+                                      const crm_closest *c)
+{
+    const double tol = crm_noise(p, edge, q, j);
+    const double along = crm_dot(c->ref.t, c->x);
+    return (c->gap > tol) & (along > tol) & (along < c->ref.length - tol) &&
+           crm_is_lowest(q, j, c->ref.m, 1.0);
+}
+
+/* Vertices i of A and j of B.  1: apart, and the line between them is clearly inside both cones:
+ * any walk ends there. */
+static inline int crm_vertices_are_closest(const crm_placed *a, int i, const crm_placed *b, int j,
+                                           crm_closest *out)
+{
+    const carom_vec2 w = crm_between(a, i, b, j);
+    out->kind = CRM_VERTICES;
+    out->a = i;
+    out->b = j;
+    out->tied = 0;
+    out->lead = 0;
+    out->gap = crm_length(w);
+    return out->gap > crm_noise(a, i, b, j) && crm_is_lowest(b, j, w, out->gap) &&
+           crm_is_lowest(a, i, crm_neg(w), out->gap);
+}
 
 /* The foot of the face's vertex is on its edge, or the other core's edge at that vertex lies along
  * the face within tol and reaches over it. */
@@ -96,9 +144,15 @@ int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closes
 void crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach,
                double slack, crm_closest *out);
 
-/* The same where neither core has more than CRM_FEW vertices. */
+/* The same where neither core has more than four, or CRM_FEW, vertices; without a start; the lead
+ * on request.  With AVX2 (CRM_AVX2: compiled in) they give the same bits. */
 enum { CRM_FEW = 8 };
-void crm_sweep_few(const crm_placed *a, const crm_placed *b, double reach, crm_closest *out);
+typedef void crm_sweep_function(const crm_placed *a, const crm_placed *b, double reach,
+                                int want_lead, crm_closest *out);
+crm_sweep_function crm_sweep_four;
+crm_sweep_function crm_sweep_eight;
+crm_sweep_function crm_sweep_four_avx2;
+crm_sweep_function crm_sweep_eight_avx2;
 
 /* libccd's GJK.  1: it says disjoint and *axis is its last direction with our support vertices, yet
  * to be certified by the caller. */

@@ -23,15 +23,13 @@ carom_manifold carom_collide_frames(const carom_shape *a, const carom_frame *fra
     const crm_placed pb =
         crm_place(b, frame_b, crm_vec(frame_b->x - frame_a->x, frame_b->y - frame_a->y));
     crm_closest c;
-    carom_manifold m;
     if (cache && pa.n + pb.n > 2) {
         crm_closest_cached(&pa, &pb, margin + radii, cache, &c);
     } else {
         crm_features(&pa, &pb, margin + radii, 0, &c);
     }
     if (c.kind == CRM_APART) return crm_no_contact(c.gap - radii);
-    crm_manifold_of(&pa, &pb, &c, margin, &m);
-    return m;
+    return crm_manifold_of(&pa, &pb, &c, margin);
 }
 
 carom_manifold carom_collide(const carom_shape *a, carom_pose pose_a, const carom_shape *b,
