@@ -8,7 +8,8 @@
 #define DEFECT_SMALL 1e-11
 /* A mode is kept while it is violated by less, in unit scale [1]. */
 #define KEEP 1e-11
-enum { MAX_ROUNDS = 32 };
+/* After SETTLING rounds more than FEW modes that change have to become fewer. */
+enum { MAX_ROUNDS = 32, SETTLING = 2, FEW = 3 };
 
 double crm_slip_sign(unsigned char mode)
 {
@@ -26,16 +27,20 @@ static void set_multipliers(crm_island *s)
     }
 }
 
+crm_response crm_mode_response(const crm_island *s, int k, double compliance)
+{
+    const double mu = s->contact[k].mu;
+    const int active = s->mode[k] != CAROM_SEPARATED;
+    return (crm_response){
+        .nn = active ? 1 / compliance : 0,
+        .tn = active ? crm_slip_sign(s->mode[k]) * mu / compliance : 0,
+        .tt = s->mode[k] == CAROM_STICK && mu > 0 ? 1 / compliance : 0,
+    };
+}
+
 void crm_set_responses(crm_island *s, double compliance)
 {
-    for (int k = 0; k < s->nc; k++) {
-        crm_response *w = &s->response[k];
-        const double mu = s->contact[k].mu;
-        const int active = s->mode[k] != CAROM_SEPARATED;
-        w->nn = active ? 1 / compliance : 0;
-        w->tn = active ? crm_slip_sign(s->mode[k]) * mu / compliance : 0;
-        w->tt = s->mode[k] == CAROM_STICK && mu > 0 ? 1 / compliance : 0;
-    }
+    for (int k = 0; k < s->nc; k++) s->response[k] = crm_mode_response(s, k, compliance);
 }
 
 /* Defects of the motion that are rounding of their own terms become zero: another pass would only
@@ -127,14 +132,18 @@ static int keep_mode(const crm_island *s, int k, unsigned char old, unsigned cha
     return 0;
 }
 
-/* Natural map at the point last measured. */
-static void update_modes(crm_island *s)
+/* Natural map at the point last measured; returns how many modes change. */
+static int update_modes(crm_island *s)
 {
+    int changed = 0;
     for (int k = 0; k < s->nc; k++) {
         const unsigned char to = (unsigned char)crm_contact_mode_of(&s->contact[k], s->x.n[k],
                                                                     s->x.t[k], s->an[k], s->ut[k]);
-        if (!keep_mode(s, k, s->mode[k], to)) s->mode[k] = to;
+        if (to == s->mode[k] || keep_mode(s, k, s->mode[k], to)) continue;
+        s->mode[k] = to;
+        changed++;
     }
+    return changed;
 }
 
 /* FNV-1a. */
@@ -148,6 +157,7 @@ static unsigned long long hash_modes(const crm_island *s)
 int crm_active_set(crm_island *s, int rounds)
 {
     unsigned long long seen[MAX_ROUNDS];
+    int changed[MAX_ROUNDS];
     for (int i = 0; i < rounds && i < MAX_ROUNDS; i++) {
         seen[i] = hash_modes(s);
         for (int q = 0; q < i; q++) {
@@ -157,7 +167,8 @@ int crm_active_set(crm_island *s, int rounds)
         const double r = crm_island_residual(s, s->x);
         if (crm_island_offer(s, s->x, r)) return 1;
         if (!(r < HUGE_VAL)) return 0;
-        update_modes(s);
+        changed[i] = update_modes(s);
+        if (i >= SETTLING && changed[i] > FEW && changed[i] >= changed[i - 2]) return 0;
     }
     return 0;
 }

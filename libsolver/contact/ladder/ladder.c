@@ -7,10 +7,13 @@
 #define GUESS_EXACT 1e-14
 
 enum {
-    ROUNDS_TRY = 5,     /* of the active set from a guess */
+    ROUNDS_GUESS = 12,  /* of the active set from the caller's modes */
+    ROUNDS_TRY = 5,     /* from the free motion, and from everything sticking */
     ROUNDS_POLISH = 8,  /* after the interior point */
     ROUNDS_REPAIR = 15, /* after sweeps and Lemke */
-    N_SWEEPS = 300,     /* first bout; each further one is twice as long */
+    DAMPED_STEPS = 150,
+    MANY = 16,      /* contacts of an island whose guess is followed further */
+    N_SWEEPS = 300, /* first bout; each further one is twice as long */
     N_BOUTS = 5,
     LEMKE_CONTACTS = 300, /* most contacts for Lemke's method ... */
     LEMKE_PIVOTS = 20,    /* ... and pivots per contact */
@@ -63,10 +66,10 @@ static int is_free(crm_island *s)
     return crm_island_offer(s, s->x, crm_island_residual(s, s->x));
 }
 
-static int try_modes(climb *c, carom_contact_stage stage)
+static int try_modes(climb *c, carom_contact_stage stage, int rounds)
 {
     *c->stage = stage;
-    const int done = crm_active_set(c->s, ROUNDS_TRY);
+    const int done = crm_active_set(c->s, rounds);
     *c->unpolished = c->s->best_residual;
     return done;
 }
@@ -97,22 +100,38 @@ static int guess_is_exact(crm_island *s)
     return crm_island_offer(s, s->x, r);
 }
 
-static int try_active_sets(climb *c, int use_guess)
+/* The polish also follows an accepted point: it makes complementarity exact. */
+static int try_interior(climb *c, carom_contact_stage stage, crm_interior_start start)
+{
+    const int done = crm_interior_point(c->s, start);
+    return polish(c, stage, done ? 1 : ROUNDS_POLISH) || done;
+}
+
+/* From the guess; where that fails and there are many contacts, from the interior near it. */
+static int try_guess(climb *c, int use_guess)
 {
     crm_island *s = c->s;
-    if (use_guess && (s->nc || use_guess == CAROM_GUESS_IMPULSES)) {
-        fit_guess(s);
-        *c->stage = CAROM_STAGE_GUESS;
-        if (use_guess == CAROM_GUESS_IMPULSES && guess_is_exact(s)) return 1;
-        if (try_modes(c, CAROM_STAGE_GUESS)) return 1;
-    }
+    const crm_interior_start near = {.fraction = 0.99, .shift = 0.1};
+    fit_guess(s);
+    *c->stage = CAROM_STAGE_GUESS;
+    if (use_guess == CAROM_GUESS_IMPULSES && guess_is_exact(s)) return 1;
+    if (try_modes(c, CAROM_STAGE_GUESS, ROUNDS_GUESS)) return 1;
+    if (s->nc < MANY || !(s->best_residual < HUGE_VAL)) return 0;
+    crm_vec_copy(s, s->x, s->best);
+    return try_interior(c, CAROM_STAGE_INTERIOR_POINT, near);
+}
+
+/* Without a guess to follow. */
+static int try_active_sets(climb *c)
+{
+    crm_island *s = c->s;
     crm_vec_zero(s, s->x);
     set_free_modes(s, 0);
-    if (try_modes(c, CAROM_STAGE_FREE)) return 1;
+    if (try_modes(c, CAROM_STAGE_FREE, ROUNDS_TRY)) return 1;
     if (!s->nc) return 0;
     crm_vec_zero(s, s->x);
     memset(s->mode, CAROM_STICK, (size_t)s->nc);
-    return try_modes(c, CAROM_STAGE_STICK);
+    return try_modes(c, CAROM_STAGE_STICK, ROUNDS_TRY);
 }
 
 /* L: the largest multiplier when everything sticks. */
@@ -124,13 +143,6 @@ static double estimate_multiplier(crm_island *s)
     crm_solve_modes(s, 2);
     for (int k = 0; k < s->nc; k++) l = fmax(l, fmax(fabs(s->x.n[k]), fabs(s->x.t[k])));
     return fmin(1e8, fmax(10, l));
-}
-
-/* The polish also follows an accepted point: it makes complementarity exact. */
-static int try_interior(climb *c, carom_contact_stage stage, crm_interior_start start)
-{
-    const int done = crm_interior_point(c->s, start);
-    return polish(c, stage, done ? 1 : ROUNDS_POLISH) || done;
 }
 
 /* A bout of sweeps from where the last one ended, then the interior point from there. */
@@ -179,6 +191,13 @@ static int try_restarts(climb *c)
     return 0;
 }
 
+static int try_damped(climb *c)
+{
+    *c->unpolished = c->s->best_residual;
+    *c->stage = CAROM_STAGE_SWEEPS;
+    return crm_damped(c->s, DAMPED_STEPS);
+}
+
 /* The rungs for what neither a guess nor the first interior point solved. */
 static int try_harder(climb *c)
 {
@@ -186,6 +205,7 @@ static int try_harder(climb *c)
     const crm_interior_start third = {.ln = 1, .slack = 1, .fraction = 0.95};
     if (try_interior(c, CAROM_STAGE_INTERIOR_POINT, second)) return 1;
     if (try_interior(c, CAROM_STAGE_INTERIOR_POINT, third)) return 1;
+    if (try_damped(c)) return 1;
     if (try_sweeps(c, 0) || try_lemke(c)) return 1;
     for (int bout = 1; c->s->max_restarts && bout < N_BOUTS; bout++) {
         if (try_sweeps(c, bout)) return 1;
@@ -200,7 +220,10 @@ carom_status crm_ladder_climb(crm_island *s, int use_guess, carom_contact_stage 
     climb c = {s, stage, unpolished, 0};
     *stage = CAROM_STAGE_NONE;
     *unpolished = 0;
-    if (is_free(s) || try_active_sets(&c, use_guess)) return CAROM_OK;
+    if (is_free(s)) return CAROM_OK;
+    const int guessed = use_guess && (s->nc || use_guess == CAROM_GUESS_IMPULSES);
+    if (guessed && try_guess(&c, use_guess)) return CAROM_OK;
+    if (!(guessed && s->nc >= MANY) && try_active_sets(&c)) return CAROM_OK;
     if (s->nc) {
         c.large = estimate_multiplier(s);
         const crm_interior_start start = {.ln = c.large, .slack = 1, .fraction = 0.995};

@@ -17,6 +17,7 @@ enum { CRM_PASSES = 12, CRM_PATIENCE = 2 };
 #define CRM_COMPLIANCE       1e-10
 #define CRM_COMPLIANCE_TIGHT 1e-13
 /* Responses of the equations of s->mode, with this compliance. */
+crm_response crm_mode_response(const crm_island *s, int k, double compliance);
 void crm_set_responses(crm_island *s, double compliance);
 /* Sign of the slip force of a mode, 0 when there is none. */
 double crm_slip_sign(unsigned char mode);
@@ -39,6 +40,9 @@ int crm_interior_point(crm_island *s, crm_interior_start start);
 /* Projected Gauss-Seidel over contacts and joint groups, from s->x (with z = J' l), where it leaves
  * its point and the natural modes. */
 void crm_sweeps(crm_island *s, int n_sweeps);
+
+/* Newton steps with damping of its own for each contact, between sweeps, from s->best. */
+int crm_damped(crm_island *s, int steps);
 
 /* Lemke's method on the natural map with sparse factors: contacts pushed apart by tau, from where
  * all are open to tau = 0.  1: reached, up to a compliance; the point and its modes are in s->x. */
