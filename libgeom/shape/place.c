@@ -31,3 +31,17 @@ void carom_vertices_place_vjp(int n, const carom_vec2 *in, carom_pose offset,
         }
     }
 }
+
+void carom_vertices_place_jvp(int n, const carom_vec2 *in, carom_pose offset, carom_pose offset_dot,
+                              const carom_vec2 *in_dot, carom_vec2 *out_dot)
+{
+    const double c = cos(offset.angle);
+    const double s = sin(offset.angle);
+    for (int i = 0; i < n; i++) {
+        const carom_vec2 turned = {c * in[i].x - s * in[i].y, s * in[i].x + c * in[i].y};
+        const carom_vec2 e = in_dot ? in_dot[i] : crm_vec(0, 0);
+        const carom_vec2 shift =
+            crm_vec(offset_dot.x + (c * e.x - s * e.y), offset_dot.y + (s * e.x + c * e.y));
+        out_dot[i] = crm_add_scaled(shift, offset_dot.angle, crm_left(turned));
+    }
+}

@@ -86,6 +86,12 @@ CAROM_API void carom_vertices_place_vjp(int n, const carom_vec2 *in, carom_pose 
                                         const carom_vec2 *out_bar, carom_pose *offset_bar,
                                         carom_vec2 *in_bar);
 
+/* Forward derivative: out_dot[n]; in_dot[n] may be NULL: the shape itself rests; out_dot may be
+ * in_dot. */
+CAROM_API void carom_vertices_place_jvp(int n, const carom_vec2 *in, carom_pose offset,
+                                        carom_pose offset_dot, const carom_vec2 *in_dot,
+                                        carom_vec2 *out_dot);
+
 #ifdef __cplusplus
 }
 #endif
