@@ -18,21 +18,28 @@ typedef struct scene {
     const char *name;
     carom_joint_kind kind;
     int to_world; /* 1: the joint holds the first body to the world, 0: two moving bodies */
+    double lower; /* both 0: no limits; else reached within the run */
+    double upper;
 } scene;
 
 static const scene SCENES[] = {
-    {"revolute", CAROM_REVOLUTE, 0},
-    {"prismatic", CAROM_PRISMATIC, 0},
-    {"weld", CAROM_WELD, 0},
-    {"wheel", CAROM_WHEEL, 0},
-    {"distance", CAROM_DISTANCE, 0},
-    {"lock x", CAROM_LOCK_X, 0},
-    {"lock y", CAROM_LOCK_Y, 0},
-    {"lock angle", CAROM_LOCK_ANGLE, 0},
-    {"rail", CAROM_PRISMATIC, 1},
-    {"wheel of the world", CAROM_WHEEL, 1},
-    {"rod of the world", CAROM_DISTANCE, 1},
-    {"x of the world", CAROM_LOCK_X, 1},
+    {"revolute", CAROM_REVOLUTE, 0, 0, 0},
+    {"prismatic", CAROM_PRISMATIC, 0, 0, 0},
+    {"weld", CAROM_WELD, 0, 0, 0},
+    {"wheel", CAROM_WHEEL, 0, 0, 0},
+    {"distance", CAROM_DISTANCE, 0, 0, 0},
+    {"lock x", CAROM_LOCK_X, 0, 0, 0},
+    {"lock y", CAROM_LOCK_Y, 0, 0, 0},
+    {"lock angle", CAROM_LOCK_ANGLE, 0, 0, 0},
+    {"rail", CAROM_PRISMATIC, 1, 0, 0},
+    {"wheel of the world", CAROM_WHEEL, 1, 0, 0},
+    {"rod of the world", CAROM_DISTANCE, 1, 0, 0},
+    {"x of the world", CAROM_LOCK_X, 1, 0, 0},
+    {"rope", CAROM_ROPE, 0, 0.6, 0.68},
+    {"stop of a hinge", CAROM_REVOLUTE, 0, -0.5, 0.4},
+    {"stop of a slider", CAROM_PRISMATIC, 0, -0.06, 0.08},
+    {"stop of a wheel", CAROM_WHEEL, 0, -0.1, 0.1},
+    {"stop of a rail", CAROM_PRISMATIC, 1, -0.5, 0.1},
 };
 enum { N_SCENES = sizeof SCENES / sizeof SCENES[0] };
 
@@ -42,9 +49,14 @@ static carom_pose at(double x, double y, double angle)
     return p;
 }
 
-static void join(carom_world *w, carom_joint_kind kind, int a, int b, double x, double y)
+static void join(carom_world *w, const scene *s, int a, int b, double x, double y)
 {
-    carom_joint_def d = carom_joint_defaults(kind);
+    carom_joint_def d = carom_joint_defaults(s->kind);
+    if (s->lower < s->upper) {
+        d.lower = s->lower;
+        d.upper = s->upper;
+        d.restitution = 0.4;
+    }
     d.body_a = a;
     d.body_b = b;
     d.anchor.x = x;
@@ -65,8 +77,9 @@ static carom_world *build(const scene *s)
     const int a = scene_box(w, 1.4, 0.4, 0.1, at(0.3, 0.1, 0.2), 0.3, 0.5);
     const int b = scene_box(w, 0.6, 0.3, 0.15, at(1.1, -0.2, -0.4), 0.2, 0.4);
     const int ball = scene_disc(w, 0.5, 0.15, 1.3, 0.75, 0.3, 0.6);
-    join(w, s->kind, s->to_world ? world : a, s->to_world ? a : b, 0.7, 0.1);
-    if (s->to_world) join(w, CAROM_REVOLUTE, a, b, 0.7, -0.05);
+    join(w, s, s->to_world ? world : a, s->to_world ? a : b, 0.7, 0.1);
+    const scene hinge = {"hinge", CAROM_REVOLUTE, 0, 0, 0};
+    if (s->to_world) join(w, &hinge, a, b, 0.7, -0.05);
     scene_push(w, a, 2, -0.3, 0.9);
     scene_push(w, b, -1, 0.4, 1.5);
     scene_push(w, ball, 1, -0.5, -3);
@@ -74,13 +87,14 @@ static carom_world *build(const scene *s)
     return w;
 }
 
-enum { Q0, V0, MASS, INERTIA, GRAVITY, DT, ANCHORS, AXES, ANGLES, LENGTHS, N_ARRAYS };
-static const char *const NAMES[N_ARRAYS] = {"q0", "v0",      "mass", "inertia", "gravity",
-                                            "dt", "anchors", "axes", "angles",  "lengths"};
+enum { Q0, V0, MASS, INERTIA, GRAVITY, DT, ANCHORS, AXES, ANGLES, LENGTHS, LOWER, UPPER, N_ARRAYS };
+static const char *const NAMES[N_ARRAYS] = {"q0",      "v0",      "mass",    "inertia",
+                                            "gravity", "dt",      "anchors", "axes",
+                                            "angles",  "lengths", "lower",   "upper"};
 
 static int count(const carom_world *w, int array)
 {
-    static const int of_joint[] = {4, 1, 1, 1};
+    static const int of_joint[] = {4, 1, 1, 1, 1, 1};
     if (array >= ANCHORS) return of_joint[array - ANCHORS] * w->n_joints;
     if (array == GRAVITY) return 2;
     if (array == DT) return 1;
@@ -99,6 +113,8 @@ static double *number(carom_world *w, int array, int k)
     case AXES: return &w->joints[k].axis;
     case ANGLES: return &w->joints[k].angle;
     case LENGTHS: return &w->joints[k].length;
+    case LOWER: return &w->joints[k].lower;
+    case UPPER: return &w->joints[k].upper;
     default: break;
     }
     crm_joint *j = &w->joints[k / 4];
@@ -106,10 +122,12 @@ static double *number(carom_world *w, int array, int k)
     return anchors[k % 4];
 }
 
-/* A static body has neither mass nor velocity. */
+/* A static body has neither mass nor velocity; a joint may have no limits. */
 static int has_meaning(const carom_world *w, int array, int k)
 {
     const int body = array == V0 ? k / 3 : k;
+    if (array == LOWER) return w->joints[k].lower > -HUGE_VAL;
+    if (array == UPPER) return w->joints[k].upper < HUGE_VAL;
     if (array != V0 && array != MASS && array != INERTIA) return 1;
     return w->bodies[body].type == CAROM_DYNAMIC;
 }
@@ -149,6 +167,8 @@ static void reverse(const run *r, carom_world *w, double x[N_ARRAYS][MAX_NUMBERS
     g.axes = x[AXES];
     g.angles = x[ANGLES];
     g.lengths = x[LENGTHS];
+    g.lower = x[LOWER];
+    g.upper = x[UPPER];
     assert_int_equal(carom_tape_create(w, NULL, &tape), CAROM_OK);
     for (int k = 0; k < N_STEPS; k++) {
         if (carom_tape_step(tape, NULL, NULL) < 0) fail_msg("%s", carom_world_error(w));
@@ -166,7 +186,9 @@ static void check_array(run *r, const carom_world *w, int a, const double *x)
         double error;
         if (!has_meaning(w, a, k)) continue;
         r->entry = k;
-        const double expected = fdiff(loss, r, STEP, &error);
+        double expected = fdiff(loss, r, STEP, &error);
+        /* an event that crosses the end of a step kinks the differences */
+        if (error > DIFFERENCE_TOL * largest) expected = fdiff(loss, r, STEP / 32, &error);
         if (fabs(x[k] - expected) <= DIFFERENCE_TOL * largest) continue;
         fail_msg("%s, integrator %d: d/d %s[%d] = %.12g, differences %.12g (+- %.2g)", r->s->name,
                  (int)scene_integrator, NAMES[a], k, x[k], expected, error);

@@ -42,6 +42,10 @@ void crm_geometry_vjp(crm_reverse *r, const double *q, const crm_contact *c,
                       const carom_contact_bar *bar, double *q_bar, int with_parameters)
 {
     const carom_world *w = r->world;
+    if (c->limit) {
+        crm_limit_vjp(r, q, c->limit, bar, q_bar, with_parameters);
+        return;
+    }
     const crm_shape *a = &w->shapes[c->shape_a];
     const crm_shape *b = &w->shapes[c->shape_b];
     carom_vec2 *vertices = with_parameters ? r->sink.g.vertices : NULL;

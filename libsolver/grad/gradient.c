@@ -92,6 +92,8 @@ static void clear_sink(const crm_reverse *r)
     clear(g->axes, (size_t)w->n_joints);
     clear(g->angles, (size_t)w->n_joints);
     clear(g->lengths, (size_t)w->n_joints);
+    clear(g->lower, (size_t)w->n_joints);
+    clear(g->upper, (size_t)w->n_joints);
 }
 
 static void drop_negligible(const carom_world *w, double *x, double scale)

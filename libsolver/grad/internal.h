@@ -82,6 +82,9 @@ typedef struct crm_joint_bar {
     carom_vec2 anchor[2];
     double axis, angle, length;
 } crm_joint_bar;
+/* Of a limit as a contact: bar as in carom_contact_vjp. */
+void crm_limit_vjp(crm_reverse *r, const double *q, int limit, const carom_contact_bar *bar,
+                   double *q_bar, int with_parameters);
 /* Of a measure and its row (may be NULL) at q. */
 void crm_measure_vjp(const crm_joint *j, crm_measure m, const double *q, const double row_bar[6],
                      double value_bar, double *q_bar, crm_joint_bar *bar);

@@ -26,23 +26,21 @@ void crm_arm_vjp(double angle, carom_vec2 local, carom_vec2 arm_bar, double *ang
     local_bar->y += -s * arm_bar.x + c * arm_bar.y;
 }
 
-/* Cotangents of what a measure is made of. */
+/* Cotangents of what a measure and its row are made of; arm_a is the measure's arm on A. */
 typedef struct frame_bar {
     carom_vec2 arm_a, arm_b, d, u;
 } frame_bar;
 
-/* Of row(u) = (-cross(arm_a (+ d), u), -u, cross(arm_b, u), u). */
-static void row_vjp(const crm_joint_frame *f, carom_vec2 u, int turns, const double g[6],
+/* Of row(u) = (-cross(arm, u), -u, cross(arm_b, u), u) with the measure's arm on A. */
+static void row_vjp(crm_measure m, const crm_joint_frame *f, carom_vec2 u, const double g[6],
                     frame_bar *bar)
 {
-    carom_vec2 a = f->arm_a;
+    const carom_vec2 a = crm_measure_arm(m, f);
     const carom_vec2 b = f->arm_b;
-    if (turns) add(&a, f->d, 1);
-    const carom_vec2 a_bar = {-g[0] * u.y, g[0] * u.x};
-    const carom_vec2 b_bar = {g[3] * u.y, -g[3] * u.x};
-    add(&bar->arm_a, a_bar, 1);
-    if (turns) add(&bar->d, a_bar, 1);
-    add(&bar->arm_b, b_bar, 1);
+    bar->arm_a.x -= g[0] * u.y;
+    bar->arm_a.y += g[0] * u.x;
+    bar->arm_b.x += g[3] * u.y;
+    bar->arm_b.y -= g[3] * u.x;
     bar->u.x += g[0] * a.y - g[1] - g[3] * b.y + g[4];
     bar->u.y += -g[0] * a.x - g[2] + g[3] * b.x + g[5];
 }
@@ -77,30 +75,44 @@ static void frame_vjp(const crm_joint *j, const double *q, const frame_bar *bar,
     crm_arm_vjp(q[3 * j->body_b], j->local_b, b_bar, qb, anchor_bar ? anchor_bar + 1 : NULL);
 }
 
-void crm_measure_vjp(const crm_joint *j, crm_measure m, const double *q, const double row_bar[6],
-                     double value_bar, double *q_bar, crm_joint_bar *bar)
+/* x holds the cotangent of the row; value_bar is that of the measure. */
+static void made_vjp(const crm_joint *j, crm_measure m, const double *q, const crm_joint_frame *f,
+                     frame_bar *x, double value_bar, double *q_bar, crm_joint_bar *bar)
 {
-    if (m == CRM_TURN) { /* a constant row */
-        q_bar[3 * j->body_a] -= j->lever * value_bar;
-        q_bar[3 * j->body_b] += j->lever * value_bar;
-        bar->angle -= j->lever * value_bar;
-        return;
-    }
-    const crm_joint_frame f = crm_joint_frame_at(j, q);
-    const carom_vec2 u = crm_measure_direction(j, m, q, &f);
-    frame_bar x = {{0, 0}, {0, 0}, {0, 0}, {0, 0}};
+    const carom_vec2 u = crm_measure_direction(j, m, q, f);
     double turn_bar;
-    if (row_bar) row_vjp(&f, u, m == CRM_ALONG || m == CRM_ASIDE, row_bar, &x);
-    add(&x.d, u, value_bar);
+    if (m == CRM_ALONG || m == CRM_ASIDE) add(&x->d, x->arm_a, 1); /* its arm is arm_a + d */
+    add(&x->d, u, value_bar);
     if (m == CRM_APART) {
         bar->length -= value_bar;
     } else {
-        add(&x.u, f.d, value_bar);
+        add(&x->u, f->d, value_bar);
     }
-    direction_vjp(m, &f, u, &x, &turn_bar);
+    direction_vjp(m, f, u, x, &turn_bar);
     q_bar[3 * j->body_a] += turn_bar;
     bar->axis += turn_bar;
-    frame_vjp(j, q, &x, q_bar, bar->anchor);
+    frame_vjp(j, q, x, q_bar, bar->anchor);
+}
+
+/* A turn has a constant row. */
+static void turn_vjp(const crm_joint *j, double value_bar, double *q_bar, crm_joint_bar *bar)
+{
+    q_bar[3 * j->body_a] -= j->lever * value_bar;
+    q_bar[3 * j->body_b] += j->lever * value_bar;
+    bar->angle -= j->lever * value_bar;
+}
+
+void crm_measure_vjp(const crm_joint *j, crm_measure m, const double *q, const double row_bar[6],
+                     double value_bar, double *q_bar, crm_joint_bar *bar)
+{
+    if (m == CRM_TURN) {
+        turn_vjp(j, value_bar, q_bar, bar);
+        return;
+    }
+    const crm_joint_frame f = crm_joint_frame_at(j, q);
+    frame_bar x = {{0, 0}, {0, 0}, {0, 0}, {0, 0}};
+    if (row_bar) row_vjp(m, &f, crm_measure_direction(j, m, q, &f), row_bar, &x);
+    made_vjp(j, m, q, &f, &x, value_bar, q_bar, bar);
 }
 
 static void give(const crm_reverse *r, int joint, const crm_joint_bar *bar)
@@ -124,4 +136,28 @@ void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double *je_
                         error_bar ? error_bar[k] : 0, q_bar, &bar);
     }
     if (with_parameters) give(r, joint, &bar);
+}
+
+/* gap = sign (measure - bound), normal = sign u. */
+void crm_limit_vjp(crm_reverse *r, const double *q, int limit, const carom_contact_bar *bar,
+                   double *q_bar, int with_parameters)
+{
+    const int joint = crm_limit_joint(limit);
+    const crm_joint *j = &r->world->joints[joint];
+    const crm_measure m = crm_limit_measure(j->kind);
+    const double sign = crm_limit_sign(limit);
+    const double value_bar = sign * bar->gap;
+    crm_joint_bar to = {{{0, 0}, {0, 0}}, 0, 0, 0};
+    if (m == CRM_TURN) {
+        turn_vjp(j, value_bar, q_bar, &to);
+    } else {
+        const crm_joint_frame f = crm_joint_frame_at(j, q);
+        frame_bar x = {bar->arm_a, bar->arm_b, {0, 0}, {0, 0}};
+        add(&x.u, bar->normal, sign);
+        made_vjp(j, m, q, &f, &x, value_bar, q_bar, &to);
+    }
+    if (!with_parameters) return;
+    double *bound = sign > 0 ? r->sink.g.lower : r->sink.g.upper;
+    if (bound) bound[joint] -= value_bar * (m == CRM_TURN ? j->lever : 1);
+    give(r, joint, &to);
 }

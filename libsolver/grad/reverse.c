@@ -73,7 +73,7 @@ void crm_restitution_vjp(crm_reverse *r, const crm_substep *s, const crm_contact
     const double a = w->restitution[c->body_a];
     const double b = w->restitution[c->body_b];
     const int rule = w->settings.combine_restitution;
-    if (!g) return;
+    if (!g || c->limit) return;
     g[c->body_a] += s->restitution * e_bar * crm_combine_slope(rule, a, b);
     g[c->body_b] += s->restitution * e_bar * crm_combine_slope(rule, b, a);
 }
@@ -94,9 +94,7 @@ void crm_targets_vjp(crm_reverse *r, const crm_substep *s, const double *v, doub
         }
         const double un = crm_row_dot(jn, v, c->body_a, c->body_b);
         if (un >= -w->rest_speed) continue;
-        const double e =
-            s->restitution * crm_combine(w->settings.combine_restitution, w->restitution[c->body_a],
-                                         w->restitution[c->body_b]);
+        const double e = s->restitution * crm_restitution(w, c);
         for (int i = 0; i < 3; i++) {
             v_bar[3 * c->body_a + i] += e * cn_bar * jn[i];
             v_bar[3 * c->body_b + i] += e * cn_bar * jn[3 + i];
@@ -128,7 +126,8 @@ void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, cons
         const double *jt_bar = rough ? &r->bars.jt[6 * k] : NULL;
         crm_contact_rows_vjp(&s->moved[k], &r->bars.jn[6 * k], jt_bar, &bar);
         crm_geometry_vjp(r, c->q, &s->moved[k], &bar, q_bar, with_parameters);
-        if (with_parameters && rough) add_friction(r, &s->moved[k], r->bars.mu[k]);
+        if (with_parameters && rough && !s->moved[k].limit)
+            add_friction(r, &s->moved[k], r->bars.mu[k]);
     }
     int row = 0;
     for (int k = 0; k < r->world->island->n_joints; k++) {

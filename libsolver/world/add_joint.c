@@ -9,9 +9,15 @@ static const double NO_DIRECTION = 1e-12;
 const char *carom_joint_kind_name(carom_joint_kind kind)
 {
     static const char *const names[CAROM_N_JOINT_KINDS] = {
-        [CAROM_REVOLUTE] = "revolute", [CAROM_PRISMATIC] = "prismatic",   [CAROM_WELD] = "weld",
-        [CAROM_WHEEL] = "wheel",       [CAROM_DISTANCE] = "distance",     [CAROM_LOCK_X] = "lock_x",
-        [CAROM_LOCK_Y] = "lock_y",     [CAROM_LOCK_ANGLE] = "lock_angle",
+        [CAROM_REVOLUTE] = "revolute",
+        [CAROM_PRISMATIC] = "prismatic",
+        [CAROM_WELD] = "weld",
+        [CAROM_WHEEL] = "wheel",
+        [CAROM_DISTANCE] = "distance",
+        [CAROM_ROPE] = "rope",
+        [CAROM_LOCK_X] = "lock_x",
+        [CAROM_LOCK_Y] = "lock_y",
+        [CAROM_LOCK_ANGLE] = "lock_angle",
     };
     const int k = (int)kind;
     return k >= 0 && k < CAROM_N_JOINT_KINDS ? names[k] : NULL;
@@ -23,8 +29,10 @@ carom_joint_def carom_joint_defaults(carom_joint_kind kind)
     d.kind = kind;
     d.body_a = d.body_b = -1;
     d.axis.x = 1;
-    d.collide = kind == CAROM_DISTANCE || kind == CAROM_LOCK_X || kind == CAROM_LOCK_Y ||
-                kind == CAROM_LOCK_ANGLE;
+    d.lower = -HUGE_VAL;
+    d.upper = HUGE_VAL;
+    d.collide = kind == CAROM_DISTANCE || kind == CAROM_ROPE || kind == CAROM_LOCK_X ||
+                kind == CAROM_LOCK_Y || kind == CAROM_LOCK_ANGLE;
     return d;
 }
 
@@ -57,12 +65,18 @@ static carom_status check_bodies(carom_world *w, const carom_joint_def *d)
     return CAROM_OK;
 }
 
+/* Joints between two points of their own. */
+static int has_two_points(const carom_joint_def *d)
+{
+    return d->kind == CAROM_DISTANCE || d->kind == CAROM_ROPE;
+}
+
 static carom_status check_places(carom_world *w, const carom_joint_def *d)
 {
     const int id = w->n_joints;
     const carom_vec2 a = d->anchor;
     const carom_vec2 b = d->anchor_b;
-    if (!finite2(a) || (d->kind == CAROM_DISTANCE && !finite2(b))) {
+    if (!finite2(a) || (has_two_points(d) && !finite2(b))) {
         return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: anchor not finite", id);
     }
     if (d->kind == CAROM_DISTANCE) {
@@ -80,6 +94,44 @@ static carom_status check_places(carom_world *w, const carom_joint_def *d)
                           d->axis.x, d->axis.y, carom_joint_kind_name(d->kind));
 }
 
+static double distance(const carom_joint_def *d)
+{
+    return hypot(d->anchor_b.x - d->anchor.x, d->anchor_b.y - d->anchor.y);
+}
+
+/* Limits hold at the present poses: at turn 0, way 0, or the present distance. */
+static carom_status check_limits(carom_world *w, const carom_joint_def *d)
+{
+    const int id = w->n_joints;
+    const char *name = carom_joint_kind_name(d->kind);
+    const int given = d->lower > -HUGE_VAL || d->upper < HUGE_VAL;
+    const int rope = d->kind == CAROM_ROPE;
+    const int may =
+        rope || d->kind == CAROM_REVOLUTE || d->kind == CAROM_PRISMATIC || d->kind == CAROM_WHEEL;
+    const double now = rope ? distance(d) : 0;
+    if (!(d->restitution >= 0 && d->restitution <= 1)) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: restitution %g is not in [0, 1]", id,
+                              d->restitution);
+    }
+    if (given && !may) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT,
+                              "joint %d: a %s joint has no limits; leave them infinite", id, name);
+    }
+    if (rope && !given) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: a rope needs a limit; give upper",
+                              id);
+    }
+    if (!(d->lower < d->upper)) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: lower %g is not below upper %g", id,
+                              d->lower, d->upper);
+    }
+    if (d->lower <= now && now <= d->upper) return CAROM_OK;
+    return crm_world_fail(w, CAROM_E_ARGUMENT,
+                          "joint %d: the %s is at %.17g, outside its limits %.17g to %.17g; widen "
+                          "them or move the bodies",
+                          id, name, now, d->lower, d->upper);
+}
+
 /* R(angle)' (point - position) */
 static carom_vec2 to_local(carom_pose p, carom_vec2 point)
 {
@@ -91,7 +143,7 @@ static crm_joint make_joint(const carom_world *w, const carom_joint_def *d)
 {
     const carom_pose a = crm_pose(w->q, d->body_a);
     const carom_pose b = crm_pose(w->q, d->body_b);
-    const carom_vec2 on_b = d->kind == CAROM_DISTANCE ? d->anchor_b : d->anchor;
+    const carom_vec2 on_b = has_two_points(d) ? d->anchor_b : d->anchor;
     const crm_measure *measures;
     crm_joint j = {0};
     j.kind = d->kind;
@@ -101,7 +153,11 @@ static crm_joint make_joint(const carom_world *w, const carom_joint_def *d)
     j.local_b = to_local(b, on_b);
     j.axis = atan2(d->axis.y, d->axis.x) - a.angle;
     j.angle = b.angle - a.angle;
-    j.length = hypot(on_b.x - d->anchor.x, on_b.y - d->anchor.y);
+    /* a rope measures from 0 */
+    if (d->kind == CAROM_DISTANCE) j.length = distance(d);
+    j.lower = d->lower;
+    j.upper = d->upper;
+    j.restitution = d->restitution;
     j.collide = d->collide != 0;
     j.first_row = w->n_joint_rows;
     j.n_rows = crm_joint_measures(d->kind, &measures);
@@ -114,6 +170,7 @@ carom_status carom_world_add_joint(carom_world *world, const carom_joint_def *de
     carom_world *w = world;
     carom_status e = check_bodies(w, def);
     if (!e) e = check_places(w, def);
+    if (!e) e = check_limits(w, def);
     if (e) return e;
     void *joints = w->joints;
     e = crm_reserve(&w->memory, &joints, &w->max_joints, w->n_joints + 1, sizeof *w->joints);

@@ -147,7 +147,7 @@ carom_status crm_detect(carom_world *w, const double *q, double margin)
         const carom_status e = m.count ? add_contacts(w, pair, &m, q, margin) : CAROM_OK;
         if (e) return e;
     }
-    return CAROM_OK;
+    return crm_detect_limits(w, q, margin, margin);
 }
 
 /* How far a point of the shape may get within h from velocity v: its way and its room [m]. */
@@ -174,11 +174,15 @@ carom_status crm_detect_ahead(carom_world *w, const double *q, const double *v, 
         const carom_status e = m.count ? add_contacts(w, pair, &m, q, margin) : CAROM_OK;
         if (e) return e;
     }
-    return CAROM_OK;
+    return crm_detect_limits(w, q, HUGE_VAL, margin);
 }
 
 void crm_contact_refresh(const carom_world *w, const double *q, crm_contact *c)
 {
+    if (c->limit) {
+        crm_limit_refresh(w, q, c);
+        return;
+    }
     const carom_contact_point p = carom_contact_eval(
         &w->shapes[c->shape_a].view, crm_pose(q, c->body_a), &w->shapes[c->shape_b].view,
         crm_pose(q, c->body_b), c->recipe, &c->normal);

@@ -64,8 +64,7 @@ static double violation(const carom_world *w, const crm_substep *s)
         const double gap = s->moved[k].gap;
         largest = fmax(largest, s->pressing[k] ? fabs(gap) : -gap);
     }
-    for (int k = 0; k < w->island->n_rows; k++)
-        largest = fmax(largest, fabs(w->rows.error[k]));
+    for (int k = 0; k < w->island->n_rows; k++) largest = fmax(largest, fabs(w->rows.error[k]));
     return largest;
 }
 
@@ -141,7 +140,7 @@ static void guess_modes(const crm_substep *s, crm_solve *c, int first)
 carom_status crm_project(carom_world *w, crm_substep *s, int first)
 {
     const double tol = POSITION_TOL * w->length + crm_rounding(w);
-    if (!s->n_contacts && !w->island->n_joints) return CAROM_OK;
+    if (!s->n_contacts && !w->island->n_rows) return CAROM_OK;
     for (int k = first; k < first + CRM_MAX_CORRECTIONS; k++) {
         crm_solve *c = &s->solve[k];
         if (k == first) crm_rows_at(w, s, s->q1);

@@ -45,10 +45,13 @@ typedef struct crm_joint {
     int body_b;
     carom_vec2 local_a;
     carom_vec2 local_b;
-    double axis;   /* direction in the frame of A [rad] */
-    double angle;  /* held turn of B against A [rad] */
-    double length; /* held distance [m] */
-    double lever;  /* makes an angle a length: L [m]; set by seal */
+    double axis;        /* direction in the frame of A [rad] */
+    double angle;       /* held turn of B against A [rad] */
+    double length;      /* held distance [m] */
+    double lever;       /* makes an angle a length: L [m]; set by seal */
+    double lower;       /* limits of what crm_limit_measure says [m, rad]; -HUGE_VAL: none */
+    double upper;       /* HUGE_VAL: none */
+    double restitution; /* at its limits */
     int collide;
     int first_row; /* among the rows of all joints */
     int n_rows;
@@ -76,6 +79,8 @@ typedef struct crm_contact {
     carom_vec2 arm_a;
     carom_vec2 arm_b;
     double gap;
+    double turn;     /* of a limit: added to the row of the turn of B against A */
+    int limit;       /* 0; else the limit of a joint that this is */
     int speculative; /* 1: not touching; constrained by J_n v + gap/h >= 0 */
 } crm_contact;
 
@@ -184,7 +189,8 @@ typedef struct crm_island {
     int *bodies;
     int n_joints;
     int *joints;
-    int n_rows; /* of the joints */
+    int n_rows;    /* of the joints */
+    int n_limited; /* joints with limits */
     int n_pairs;
     carom_pair *pairs; /* shapes; also with static bodies */
     int clock;         /* the body whose owed time the frame takes over */
@@ -397,6 +403,27 @@ double crm_measure_at(const crm_joint *j, crm_measure m, const double *q, double
 void crm_joint_rows(const crm_joint *j, const double *q, double *je, double *error);
 /* Largest joint error at q [m]. */
 double crm_joint_drift(const carom_world *w, const double *q);
+
+/* Lever arm on A of the row: to the anchor of B where the direction turns with A. */
+carom_vec2 crm_measure_arm(crm_measure m, const crm_joint_frame *f);
+
+/* limit.c: a limit of a joint is a frictionless contact whose gap is the way to the limit. */
+int crm_joint_has_limits(const crm_joint *j);
+/* What is limited: a turn, a way along the axis, or a distance. */
+crm_measure crm_limit_measure(carom_joint_kind kind);
+/* Joint of a limit, and the sign of d gap / d measure. */
+int crm_limit_joint(int limit);
+double crm_limit_sign(int limit);
+/* The limit as a contact at q. */
+crm_contact crm_limit_at(const carom_world *w, int limit, const double *q);
+void crm_limit_refresh(const carom_world *w, const double *q, crm_contact *c);
+/* Slots for limits of the island, and the limit in each, 0 when it has none. */
+int crm_limit_slots(const carom_world *w);
+int crm_limit_in(const carom_world *w, int slot);
+/* Limits of the island with gap <= reach, behind sub.contacts; beyond margin speculative. */
+carom_status crm_detect_limits(carom_world *w, const double *q, double reach, double margin);
+/* Of a contact, or of a limit. */
+double crm_restitution(const carom_world *w, const crm_contact *c);
 
 /* substep.c: memory of sub-steps and rows; contacts found so far are kept when it grows. */
 carom_status crm_substep_create(carom_world *w, crm_substep *s);

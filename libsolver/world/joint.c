@@ -15,6 +15,7 @@ static const row_list HELD[CAROM_N_JOINT_KINDS] = {
     [CAROM_WELD] = {3, {CRM_ACROSS_X, CRM_ACROSS_Y, CRM_TURN}},
     [CAROM_WHEEL] = {1, {CRM_ASIDE}},
     [CAROM_DISTANCE] = {1, {CRM_APART}},
+    [CAROM_ROPE] = {0, {CRM_APART}},
     [CAROM_LOCK_X] = {1, {CRM_ACROSS_X}},
     [CAROM_LOCK_Y] = {1, {CRM_ACROSS_Y}},
     [CAROM_LOCK_ANGLE] = {1, {CRM_TURN}},
@@ -69,12 +70,18 @@ carom_vec2 crm_measure_direction(const crm_joint *j, crm_measure m, const double
     return u;
 }
 
-/* The turn of u with A moves the arm on A to the anchor of B. */
-static void direction_row(const crm_joint_frame *f, carom_vec2 u, int turns, double row[6])
+/* The turn of a direction with A moves the arm on A to the anchor of B. */
+carom_vec2 crm_measure_arm(crm_measure m, const crm_joint_frame *f)
 {
-    const double x = f->arm_a.x + (turns ? f->d.x : 0);
-    const double y = f->arm_a.y + (turns ? f->d.y : 0);
-    row[0] = -(x * u.y - y * u.x);
+    const int turns = m == CRM_ALONG || m == CRM_ASIDE;
+    const carom_vec2 arm = {f->arm_a.x + (turns ? f->d.x : 0), f->arm_a.y + (turns ? f->d.y : 0)};
+    return arm;
+}
+
+static void direction_row(crm_measure m, const crm_joint_frame *f, carom_vec2 u, double row[6])
+{
+    const carom_vec2 arm = crm_measure_arm(m, f);
+    row[0] = -(arm.x * u.y - arm.y * u.x);
     row[1] = -u.x;
     row[2] = -u.y;
     row[3] = f->arm_b.x * u.y - f->arm_b.y * u.x;
@@ -92,7 +99,7 @@ double crm_measure_at(const crm_joint *j, crm_measure m, const double *q, double
     }
     const crm_joint_frame f = crm_joint_frame_at(j, q);
     const carom_vec2 u = crm_measure_direction(j, m, q, &f);
-    direction_row(&f, u, m == CRM_ALONG || m == CRM_ASIDE, row);
+    direction_row(m, &f, u, row);
     if (m == CRM_APART) return hypot(f.d.x, f.d.y) - j->length;
     return u.x * f.d.x + u.y * f.d.y;
 }
@@ -112,6 +119,9 @@ double crm_joint_drift(const carom_world *w, const double *q)
         double e[CRM_MAX_JOINT_ROWS] = {0, 0, 0};
         crm_joint_rows(&w->joints[k], q, je, e);
         largest = fmax(largest, sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]));
+        for (int side = 1; crm_joint_has_limits(&w->joints[k]) && side <= 2; side++) {
+            largest = fmax(largest, -crm_limit_at(w, 2 * k + side, q).gap);
+        }
     }
     return largest;
 }

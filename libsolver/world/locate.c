@@ -17,6 +17,7 @@ enum { MAX_ROOT_STEPS = 60, MAX_ROUNDS = 20, MAX_HALVINGS = 4, MAX_SAMPLES = 64 
  * feature of a pair that touches elsewhere. */
 typedef struct watch {
     carom_pair pair;
+    int limit; /* of a joint, in place of a pair; or 0 */
     int by_recipe;
     carom_recipe recipe;
     int opened;  /* 1: touching at q0 and opening; g is then (gap - base) / h, without root at 0 */
@@ -27,8 +28,19 @@ typedef struct watch {
     int touches; /* 1: closes exactly at the end rather than overlaps */
 } watch;
 
+static const carom_pair NO_PAIR = {0, 0};
+
+static watch watch_of(carom_pair pair)
+{
+    watch x = {0};
+    x.pair = pair;
+    x.at = 1;
+    return x;
+}
+
 static double watch_gap(const carom_world *w, const watch *x, const double *q)
 {
+    if (x->limit) return crm_limit_at(w, x->limit, q).gap;
     if (!x->by_recipe) return crm_collide(w, x->pair, q, HUGE_VAL).distance;
     crm_contact c = {0};
     c.shape_a = x->pair.a;
@@ -47,23 +59,39 @@ static double watch_value(const carom_world *w, const watch *x, const double *q,
     return x->opened ? (gap - x->base) / h : gap;
 }
 
+static double opening_speed(const crm_contact *c, const double *v)
+{
+    double jn[6];
+    double jt[6];
+    crm_contact_rows(c, jn, jt);
+    return crm_row_dot(jn, v, c->body_a, c->body_b);
+}
+
+/* Slowest opening of the points of a closed watch at q0; HUGE_VAL without any. */
+static double opening_of(const carom_world *w, const watch *x)
+{
+    const crm_substep *s = &w->sub;
+    double opening = HUGE_VAL;
+    if (x->limit) {
+        const crm_contact c = crm_limit_at(w, x->limit, s->q0);
+        return opening_speed(&c, s->v0);
+    }
+    const carom_manifold m = crm_collide(w, x->pair, s->q0, w->settings.margin * w->length);
+    for (int k = 0; k < m.count; k++) {
+        const crm_contact c = crm_contact_of(w, x->pair, &m, k, s->q0);
+        if (x->by_recipe && !crm_recipe_same(c.recipe, x->recipe)) continue;
+        opening = fmin(opening, opening_speed(&c, s->v0));
+    }
+    return opening;
+}
+
 /* Fills g0 from q0: the gap, or of a closed pair that opens its speed. */
 static void watch_start(const carom_world *w, watch *x)
 {
     const crm_substep *s = &w->sub;
-    const double slop = w->settings.margin * w->length;
     x->g0 = watch_gap(w, x, s->q0);
-    if (x->g0 > slop) return;
-    const carom_manifold m = crm_collide(w, x->pair, s->q0, slop);
-    double opening = HUGE_VAL;
-    for (int k = 0; k < m.count; k++) {
-        double jn[6];
-        double jt[6];
-        const crm_contact c = crm_contact_of(w, x->pair, &m, k, s->q0);
-        if (x->by_recipe && !crm_recipe_same(c.recipe, x->recipe)) continue;
-        crm_contact_rows(&c, jn, jt);
-        opening = fmin(opening, crm_row_dot(jn, s->v0, c.body_a, c.body_b));
-    }
+    if (x->g0 > w->settings.margin * w->length) return;
+    const double opening = opening_of(w, x);
     if (!(opening > 0 && opening < HUGE_VAL)) {
         /* A feature of a pair that touches there already is held by its other points. */
         if (x->by_recipe) x->g0 = 0;
@@ -135,7 +163,10 @@ static void consider_features(search *f, carom_pair pair, int k)
     for (int i = 0; i < m.count; i++) {
         const crm_contact c = crm_contact_of(f->w, pair, &m, i, s->q1);
         if (held_recipe(s, k, pair, c.recipe)) continue;
-        const watch x = {pair, 1, c.recipe, 0, 0, 0, c.gap, 1, 0};
+        watch x = watch_of(pair);
+        x.by_recipe = 1;
+        x.recipe = c.recipe;
+        x.g1 = c.gap;
         consider(f, &x);
     }
 }
@@ -161,7 +192,7 @@ static int samples(const carom_world *w, carom_pair pair)
 static void consider_pair(search *f, carom_pair pair)
 {
     const crm_substep *s = &f->w->sub;
-    watch x = {pair, 0, {0}, 0, 0, 0, 0, 1, 0};
+    watch x = watch_of(pair);
     const int n = samples(f->w, pair);
     for (int i = 1; i < n; i++) {
         const double at = (double)i / n;
@@ -178,15 +209,33 @@ static void consider_pair(search *f, carom_pair pair)
     consider(f, &x);
 }
 
+static int holds_limit(const crm_substep *s, int limit)
+{
+    for (int k = s->n_contacts - 1; k >= 0 && s->contacts[k].limit; k--) {
+        if (s->contacts[k].limit == limit) return 1;
+    }
+    return 0;
+}
+
+static void consider_limits(search *f)
+{
+    const carom_world *w = f->w;
+    const int n = crm_limit_slots(w);
+    for (int slot = 0; slot < n; slot++) {
+        watch x = watch_of(NO_PAIR);
+        x.limit = crm_limit_in(w, slot);
+        if (!x.limit || holds_limit(&w->sub, x.limit)) continue;
+        x.g1 = watch_gap(w, &x, w->sub.q1);
+        consider(f, &x);
+    }
+}
+
 /* The earliest watched gap that has closed at q1, into *found; 0 when there is none. */
 static void first_closed(carom_world *w, watch *found, int *any)
 {
     const double noise = crm_rounding(w);
-    search f = {w,
-                w->settings.penetration * w->length + noise,
-                CRM_HIT_TOL * w->length + noise,
-                0,
-                {{0, 0}, 0, {0}, 0, 0, 0, 0, 1, 0}};
+    search f = {w, w->settings.penetration * w->length + noise, CRM_HIT_TOL * w->length + noise, 0,
+                watch_of(NO_PAIR)};
     int cursor = 0;
     for (int k = 0; k < w->island->n_pairs; k++) {
         const carom_pair pair = w->island->pairs[k];
@@ -197,6 +246,7 @@ static void first_closed(carom_world *w, watch *found, int *any)
             consider_pair(&f, pair);
         }
     }
+    consider_limits(&f);
     *any = f.any;
     *found = f.best;
 }
@@ -237,6 +287,11 @@ static carom_status find_root(carom_world *w, const watch *x, double *h)
 static int set_event(carom_world *w, const watch *x)
 {
     crm_substep *s = &w->sub;
+    s->end = CRM_END_EVENT;
+    if (x->limit) {
+        s->event = crm_limit_at(w, x->limit, s->q1);
+        return 1;
+    }
     const double near = CRM_HIT_TOL * w->length + 4 * crm_rounding(w);
     const carom_manifold m = crm_collide(w, x->pair, s->q1, x->by_recipe ? HUGE_VAL : near);
     int best = -1;
@@ -247,15 +302,14 @@ static int set_event(carom_world *w, const watch *x)
     }
     if (best < 0) return 0;
     s->event = crm_contact_of(w, x->pair, &m, best, s->q1);
-    s->end = CRM_END_EVENT;
     return 1;
 }
 
 /* Same gap: the one whose root was just found. */
 static int same_watch(const watch *x, const watch *y)
 {
-    return x->pair.a == y->pair.a && x->pair.b == y->pair.b && x->by_recipe == y->by_recipe &&
-           (!x->by_recipe || crm_recipe_same(x->recipe, y->recipe));
+    return x->limit == y->limit && x->pair.a == y->pair.a && x->pair.b == y->pair.b &&
+           x->by_recipe == y->by_recipe && (!x->by_recipe || crm_recipe_same(x->recipe, y->recipe));
 }
 
 static void end_at_fraction(crm_substep *s, double left)
@@ -335,9 +389,10 @@ static int passes(const carom_world *w, carom_pair pair, watch *x)
 
 carom_status crm_stop_passing(carom_world *w, double left)
 {
-    watch first = {{0, 0}, 0, {0}, 0, 0, 0, 0, 2, 0};
+    watch first = watch_of(NO_PAIR);
+    first.at = 2;
     for (int k = 0; k < w->island->n_pairs; k++) {
-        watch x = {w->island->pairs[k], 0, {0}, 0, 0, 0, 0, 1, 0};
+        watch x = watch_of(w->island->pairs[k]);
         if (!passes(w, x.pair, &x) || x.at >= first.at) continue;
         watch_start(w, &x);
         if (x.g0 > 0 && !x.opened) first = x;

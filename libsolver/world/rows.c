@@ -46,6 +46,8 @@ void crm_contact_rows(const crm_contact *c, double jn[6], double jt[6])
 {
     const carom_vec2 t = {-c->normal.y, c->normal.x};
     direction_row(c->arm_a, c->arm_b, c->normal, jn);
+    jn[0] -= c->turn;
+    jn[3] += c->turn;
     direction_row(c->arm_a, c->arm_b, t, jt);
 }
 
@@ -66,7 +68,7 @@ static void fill_contacts(carom_world *w, const crm_substep *s)
         crm_contact_rows(c, &r->jn[6 * k], &r->jt[6 * k]);
         r->mu[k] = crm_combine(w->settings.combine_friction, w->friction[c->body_a],
                                w->friction[c->body_b]);
-        if (s->map == CRM_MAP_SMOOTH && sharp(w, c)) r->mu[k] = 0;
+        if (c->limit || (s->map == CRM_MAP_SMOOTH && sharp(w, c))) r->mu[k] = 0;
     }
 }
 
@@ -155,8 +157,7 @@ void crm_velocity_targets(carom_world *w, const crm_substep *s, const double *v,
     for (int k = 0; k < s->n_contacts; k++) {
         const crm_contact *x = &s->contacts[k];
         const double un = crm_row_dot(&w->rows.jn[6 * k], v, x->body_a, x->body_b);
-        const double e = crm_combine(w->settings.combine_restitution, w->restitution[x->body_a],
-                                     w->restitution[x->body_b]);
+        const double e = crm_restitution(w, x);
         c->cn[k] = 0;
         c->ct[k] = 0;
         if (x->speculative) {

@@ -121,7 +121,7 @@ static carom_status stage_1(carom_world *w, crm_substep *s)
         const carom_status e = crm_solve_run(w, s, c, 1);
         if (e < 0) return e;
         end_pose(w, s, c);
-        if (!s->n_contacts && !w->island->n_joints) return CAROM_OK;
+        if (!s->n_contacts && !w->island->n_rows) return CAROM_OK;
         moved = next_sides(w, s, c, &s->solve[1]);
         if (moved <= tol) return CAROM_OK;
         if (!(moved < FAR * w->length)) return CAROM_E_NO_SOLUTION;
@@ -169,7 +169,7 @@ static carom_status clear_errors(carom_world *w, crm_substep *s)
         worst = fmax(worst, fabs(s->joint_target[k]));
     }
     if (worst <= slop) return CAROM_OK;
-    memset(s->pressing, 0, (size_t)s->n_contacts);
+    if (s->n_contacts) memset(s->pressing, 0, (size_t)s->n_contacts);
     return crm_project(w, s, 2);
 }
 
@@ -197,9 +197,7 @@ static double bounce_side(const carom_world *w, const crm_substep *s, int k, dou
     const double un = crm_row_dot(&w->rows.jn[6 * k], s->v0, c->body_a, c->body_b);
     if (un > w->rest_speed) return apart;
     if (un >= -fmax(w->rest_speed, 2 * g * s->h)) return 0;
-    return s->restitution * un *
-           crm_combine(w->settings.combine_restitution, w->restitution[c->body_a],
-                       w->restitution[c->body_b]);
+    return s->restitution * un * crm_restitution(w, c);
 }
 
 /* Right-hand sides of a bounce, rows at q1 in place; 1 when a contact bounces. */

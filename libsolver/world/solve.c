@@ -43,7 +43,7 @@ static void take_velocities(const carom_world *w, const double *v, double *to)
 
 carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use_guess)
 {
-    if (!s->n_contacts && !w->island->n_joints) {
+    if (!s->n_contacts && !w->island->n_rows) {
         s->degenerate = 0;
         take_velocities(w, w->rows.u, c->v);
         return CAROM_OK;

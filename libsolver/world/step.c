@@ -63,7 +63,7 @@ static int substeps_allowed(const carom_world *w)
 {
     if (w->settings.integrator == CAROM_FIXED) return 1;
     const int n = w->island->n_bodies > 0 ? BODY_SUBSTEPS / w->island->n_bodies : BODY_SUBSTEPS;
-    if (n < 1 || !w->island->n_pairs) return 1;
+    if (n < 1 || (!w->island->n_pairs && !w->island->n_limited)) return 1;
     return n < w->settings.max_substeps ? n : w->settings.max_substeps;
 }
 
@@ -129,10 +129,11 @@ static void finish_island(carom_world *w, double left)
     }
     for (int k = 0; k < s->n_contacts; k++) {
         crm_contact c = s->contacts[k];
+        if (c.limit) continue;
         crm_contact_refresh(w, w->q, &c);
         t->penetration = fmax(t->penetration, -c.gap);
+        t->n_contacts++;
     }
-    t->n_contacts += s->n_contacts;
     if (w->n_substeps > t->n_substeps) t->n_substeps = w->n_substeps;
 }
 

@@ -187,7 +187,9 @@ double carom_world_energy(const carom_world *world)
 
 int carom_world_n_contacts(const carom_world *world)
 {
-    return world->touches.n;
+    int n = world->touches.n;
+    while (n > 0 && world->touches.list[n - 1].contact.limit) n--; /* limits are the last */
+    return n;
 }
 
 carom_contact_info carom_world_contact(const carom_world *world, int k)
@@ -231,8 +233,8 @@ carom_world_size carom_world_measure(const carom_world *world)
     z.n_joints = w->n_joints;
     z.n_unknowns = 3 * (z.n_dynamic + z.n_kinematic);
     z.n_joint_rows = w->n_joint_rows;
-    z.n_contacts = w->touches.n;
-    for (int k = 0; k < w->touches.n; k++) {
+    z.n_contacts = carom_world_n_contacts(w);
+    for (int k = 0; k < z.n_contacts; k++) {
         const crm_contact *c = &w->touches.list[k].contact;
         z.n_friction += crm_combine(w->settings.combine_friction, w->friction[c->body_a],
                                     w->friction[c->body_b]) > 0;

@@ -53,6 +53,8 @@ typedef struct carom_gradient {
     double *axes;         /* n_joints: direction of the line in the frame of body A, an angle */
     double *angles;       /* n_joints: held turn of body B against body A */
     double *lengths;      /* n_joints: held distance */
+    double *lower;        /* n_joints: limits */
+    double *upper;        /* n_joints */
 } carom_gradient;
 
 typedef struct carom_gradient_stats {

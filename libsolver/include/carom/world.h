@@ -123,6 +123,7 @@ typedef enum carom_joint_kind {
     CAROM_WELD,       /* a point and the turn of B against A */
     CAROM_WHEEL,      /* a point of B stays on a line of A */
     CAROM_DISTANCE,   /* the distance of two points: a rod */
+    CAROM_ROPE,       /* nothing; its limits bound the distance of two points */
     CAROM_LOCK_X,     /* x of a point of B against that of A, in the world's axes */
     CAROM_LOCK_Y,     /* y, likewise */
     CAROM_LOCK_ANGLE, /* the turn of B against A */
@@ -135,17 +136,20 @@ typedef struct carom_joint_def {
     carom_joint_kind kind;
     int body_a;
     int body_b;
-    carom_vec2 anchor;   /* world point, of both bodies; of a distance joint the point of A [m] */
-    carom_vec2 anchor_b; /* distance joint: the point of B, apart from the other [m] */
+    carom_vec2 anchor;   /* world point, of both bodies; of a distance or rope the point of A [m] */
+    carom_vec2 anchor_b; /* distance, rope: the point of B; of a distance apart from the other [m] */
     carom_vec2 axis;     /* prismatic, wheel: direction of the line, of any length */
-    int collide;         /* 1: the two bodies may touch each other */
+    double lower; /* lower and upper limit of: the turn of B against A from now on [rad], revolute; */
+    double upper; /* its way along the axis [m], prismatic and wheel; the distance [m], rope */
+    double restitution; /* at the limits [1], 0 to 1 */
+    int collide;        /* 1: the two bodies may touch each other */
 } carom_joint_def;
 
-/* Bodies -1 (to be given), points at the origin, axis (1, 0); only bodies joined by a distance or a
- * lock collide. */
+/* Bodies -1 (to be given), points at the origin, axis (1, 0), no limits, restitution 0; only bodies
+ * joined by a distance, a rope or a lock collide. */
 CAROM_API carom_joint_def carom_joint_defaults(carom_joint_kind kind);
-/* "revolute", "prismatic", "weld", "wheel", "distance", "lock_x", "lock_y", "lock_angle"; NULL for
- * any other number. */
+/* "revolute", "prismatic", "weld", "wheel", "distance", "rope", "lock_x", "lock_y", "lock_angle";
+ * NULL for any other number. */
 CAROM_API const char *carom_joint_kind_name(carom_joint_kind kind);
 /* Adds a joint; *index (may be NULL) is its number.  CAROM_E_ARGUMENT, CAROM_E_MEMORY;
  * CAROM_E_STATE once the world is sealed. */
