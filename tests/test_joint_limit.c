@@ -208,8 +208,9 @@ static void crowd(void **state)
             carom_step_stats stats;
             const carom_status e = carom_world_step(w, NULL, &stats);
             if (e < 0) fail_msg("integrator %d, step %d: %s", i, k, carom_world_error(w));
-            /* limits that close in a sub-step that nobody located end within the margin */
-            assert_at_most("past a limit", stats.joint_drift, 1e-6 * 0.2);
+            /* a step whose corrections did not end says so */
+            assert_at_most("past a limit", stats.joint_drift,
+                           (e < CAROM_LIMIT ? 1e-9 : 1e-3) * 0.2);
         }
         carom_world_destroy(w);
     }

@@ -173,8 +173,22 @@ static const fault FAULTS[] = {
      ONE("\"mass\":1,\"shapes\":[{\"type\":\"circle\",\"radius\":1},{\"type\":\"circle\","
          "\"radius\":-1}]"),
      "bodies[0].shapes[1].radius: "},
-    {"joint type", JOINT("\"type\":\"weld\""),
-     "joints[0].type: \"weld\" is not known; one of: revolute"},
+    {"joint type", JOINT("\"type\":\"glue\""),
+     "joints[0].type: \"glue\" is not known; one of: revolute, prismatic, weld"},
+    {"axis of a weld",
+     JOINT("\"type\":\"weld\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0],\"axis\":[1,0]"),
+     "joints[0].axis: unknown key"},
+    {"no axis", JOINT("\"type\":\"prismatic\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0]"),
+     "joints[0].axis: must be given"},
+    {"no anchor_b", JOINT("\"type\":\"distance\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0]"),
+     "joints[0].anchor_b: must be given"},
+    {"limits crossed",
+     JOINT("\"type\":\"revolute\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0],\"lower\":1,"
+           "\"upper\":0"),
+     "joints[0].lower: must be below upper"},
+    {"slack for ever",
+     JOINT("\"type\":\"rope\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0],\"anchor_b\":[1,0]"),
+     "joints[0].upper: must be given"},
     {"no joint type", JOINT("\"body_a\":0"), "joints[0].type: must be given"},
     {"joint key",
      JOINT("\"type\":\"revolute\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0],\"limit\":1"),
@@ -247,7 +261,7 @@ static void all_faults_come_at_once(void **state)
     crm_problems problems;
     crm_scene *scene =
         read_text(HEAD "\"dt\":-1,\"x\":1,\"bodies\":[{\"mass\":-1,\"mass\":0,\"friction\":-1}],"
-                       "\"joints\":[{\"type\":\"weld\"}]}",
+                       "\"joints\":[{\"type\":\"glue\"}]}",
                   &problems);
     assert_null(scene);
     /* dt; x; mass twice; mass = 0; friction; joint type.  Inertia is not asked for beside them. */
@@ -291,7 +305,11 @@ static void values_are_taken(void **state)
         "\"filter\":{\"category\":2,\"mask\":4294967295,\"group\":-3},\"forces\":[10,11,12],"
         "\"shapes\":[{\"type\":\"circle\",\"radius\":1,\"center\":[0.5,-1]},"
         "{\"type\":\"capsule\",\"vertices\":[[0,0],[1,0]],\"radius\":0.5}]}],"
-        "\"joints\":[{\"type\":\"revolute\",\"body_a\":\"w\",\"body_b\":\"m\",\"anchor\":[1,2]}]}",
+        "\"joints\":[{\"type\":\"revolute\",\"body_a\":\"w\",\"body_b\":\"m\",\"anchor\":[1,2]},"
+        "{\"type\":\"wheel\",\"body_a\":\"w\",\"body_b\":\"m\",\"anchor\":[1,2],\"axis\":[3,4],"
+        "\"lower\":-0.5,\"upper\":0.25,\"restitution\":0.75,\"collide\":true},"
+        "{\"type\":\"rope\",\"body_a\":\"w\",\"body_b\":\"m\",\"anchor\":[1,2],\"anchor_b\":[5,6],"
+        "\"upper\":9}]}",
         &problems);
     expect_valid(scene, &problems);
     const carom_body_def *d = &scene->bodies[1].def;
@@ -305,7 +323,12 @@ static void values_are_taken(void **state)
     assert_true(d->collide == 0 && d->filter.category == 2 && d->filter.mask == 4294967295u);
     assert_true(d->filter.group == -3 && d->force[0] == 10 && d->force[2] == 12);
     assert_true(d->n_shapes == 2 && d->shapes[0].vertices[0].y == -1 && d->shapes[1].count == 2);
-    assert_true(scene->n_joints == 1 && scene->joints[0].body_b == 1);
+    const carom_joint_def *j = scene->joints;
+    assert_true(scene->n_joints == 3 && j[0].kind == CAROM_REVOLUTE && j[0].body_b == 1);
+    assert_true(j[0].anchor.y == 2 && !(j[0].lower > -HUGE_VAL) && !j[0].collide);
+    assert_true(j[1].kind == CAROM_WHEEL && j[1].axis.x == 3 && j[1].lower == -0.5);
+    assert_true(j[1].upper == 0.25 && j[1].restitution == 0.75 && j[1].collide);
+    assert_true(j[2].kind == CAROM_ROPE && j[2].anchor_b.y == 6 && j[2].upper == 9);
     crm_scene_free(scene);
 }
 

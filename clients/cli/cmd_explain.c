@@ -62,8 +62,9 @@ static double count_joined(const crm_scene *s)
 {
     double n = 0;
     for (int k = 0; k < s->n_joints; k++) {
-        const crm_scene_joint *j = &s->joints[k];
-        n += can_touch(&s->bodies[j->body_a].def) && can_touch(&s->bodies[j->body_b].def);
+        const carom_joint_def *j = &s->joints[k];
+        n += !j->collide && can_touch(&s->bodies[j->body_a].def) &&
+             can_touch(&s->bodies[j->body_b].def);
     }
     return n;
 }

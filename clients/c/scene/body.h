@@ -8,8 +8,4 @@
 void crm_body_read(crm_problems *problems, const crm_node *node, crm_scene_body *body);
 void crm_body_free(crm_scene_body *body);
 
-/* Reads joints[i]; the scene's bodies are there already. */
-void crm_joint_read(crm_problems *problems, const crm_node *node, const crm_scene *scene,
-                    crm_scene_joint *joint);
-
 #endif

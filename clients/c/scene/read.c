@@ -1,6 +1,7 @@
 #include "scene.h"
 
 #include "body.h"
+#include "joint.h"
 
 #include <limits.h>
 #include <math.h>

@@ -1,5 +1,6 @@
 #include "remote.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -86,6 +87,25 @@ static int put_joints(const crm_scene *scene, carom_client_scene *out)
         joints[k].anchor = scene->joints[k].anchor;
     }
     out->n_joints = scene->n_joints;
+    return 1;
+}
+
+/* The messages know revolute joints without limits. */
+int crm_scene_travels(const crm_scene *scene, char *why, size_t size)
+{
+    why[0] = '\0';
+    for (int k = 0; k < scene->n_joints; k++) {
+        const carom_joint_def *j = &scene->joints[k];
+        const int limited = j->lower > -HUGE_VAL || j->upper < HUGE_VAL;
+        if (j->kind == CAROM_REVOLUTE && !limited && !j->collide) continue;
+        snprintf(why, size,
+                 "joints[%d]: a %s joint%s cannot be sent to a server yet; `carom run` takes it", k,
+                 carom_joint_kind_name(j->kind),
+                 j->kind != CAROM_REVOLUTE ? ""
+                 : limited                 ? " with limits"
+                                           : " between bodies that collide");
+        return 0;
+    }
     return 1;
 }
 

@@ -22,12 +22,6 @@ typedef struct crm_scene_body {
     crm_force_row *rows; /* the table, times increasing */
 } crm_scene_body;
 
-typedef struct crm_scene_joint {
-    int body_a;
-    int body_b;
-    carom_vec2 anchor; /* world point at the initial poses [m] */
-} crm_scene_joint;
-
 typedef struct crm_scene {
     const char *name;
     carom_world_settings settings; /* dt and gravity included */
@@ -36,7 +30,7 @@ typedef struct crm_scene {
     int n_bodies;
     crm_scene_body *bodies;
     int n_joints;
-    crm_scene_joint *joints;
+    carom_joint_def *joints; /* at the initial poses */
     json_t *json; /* what the views point into */
 } crm_scene;
 

@@ -34,12 +34,12 @@ static carom_status move_body(carom_world *w, int body, double dx, double dy)
 
 /* The joint is made while its body stands moved by -by: its anchor then lies at +by in the frame.
  */
-static carom_status add_shifted(const crm_scene_joint *j, const crm_anchor_shift *shift,
+static carom_status add_shifted(const carom_joint_def *j, const crm_anchor_shift *shift,
                                 carom_world *w)
 {
     const int body = shift->of_body_b ? j->body_b : j->body_a;
     carom_status s = move_body(w, body, -shift->by.x, -shift->by.y);
-    if (s >= 0) s = carom_world_add_revolute(w, j->body_a, j->body_b, j->anchor, NULL);
+    if (s >= 0) s = carom_world_add_joint(w, j, NULL);
     if (s >= 0) s = move_body(w, body, shift->by.x, shift->by.y);
     return s;
 }
@@ -48,11 +48,9 @@ static carom_status add_joints(const crm_scene *scene, const crm_anchor_shift *s
                                carom_world *w, char *why, size_t size)
 {
     for (int k = 0; k < scene->n_joints; k++) {
-        const crm_scene_joint *j = &scene->joints[k];
+        const carom_joint_def *j = &scene->joints[k];
         const int moved = shift && shift->joint == k;
-        const carom_status s =
-            moved ? add_shifted(j, shift, w)
-                  : carom_world_add_revolute(w, j->body_a, j->body_b, j->anchor, NULL);
+        const carom_status s = moved ? add_shifted(j, shift, w) : carom_world_add_joint(w, j, NULL);
         if (s >= 0) continue;
         snprintf(why, size, "joints[%d]: %s", k, carom_world_error(w));
         return s;
