@@ -33,8 +33,8 @@ static void on_state(void *user, const carom_client_state *state)
 /* Where a run ends early, its last state is no sample. */
 static void put_last(sending *s, const carom_client_state *state)
 {
-    const long k = state ? (long)state->step : -1;
-    if (k <= s->written) return;
+    if (!state || state->step <= s->written) return;
+    const long k = (long)state->step;
     crm_put_state(s->out, k, state->time, state->n_bodies, state->q, state->v);
     s->written = k;
 }

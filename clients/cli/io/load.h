@@ -15,7 +15,7 @@
 #define CRM_LOAD_HELP                                                                              \
     "  --dt H             length of a step [s]\n"                                                  \
     "  --duration T       simulated time [s]\n"                                                    \
-    "  --integrator NAME  euler or located\n"                                                      \
+    "  --integrator NAME  euler, located or fixed\n"                                               \
     "  --set KEY=VALUE    a setting by name, like margin=1e-5; may be repeated\n"                  \
     "  --quiet            no progress bar and no remarks\n"
 
