@@ -495,5 +495,7 @@ carom_status crm_locate(carom_world *w, double left, int allowed, int *busy);
 
 /* seal.c */
 carom_status crm_seal(carom_world *w);
+/* The same without a look at overlaps: for a state that a step left. */
+carom_status crm_seal_as_is(carom_world *w);
 void crm_free_sealed(carom_world *w);
 #endif

@@ -194,7 +194,7 @@ static carom_status clear_overlap(carom_world *w)
     return CAROM_OK;
 }
 
-carom_status crm_seal(carom_world *w)
+static carom_status seal(carom_world *w, int as_is)
 {
     if (w->sealed) return CAROM_OK;
     carom_step_stats own = {0};
@@ -205,7 +205,7 @@ carom_status crm_seal(carom_world *w)
     if (!e) {
         crm_sort_joined(w);
         w->stats = &own;
-        e = clear_overlap(w);
+        e = as_is ? CAROM_OK : clear_overlap(w);
         w->stats = stats;
     }
     if (e) {
@@ -215,6 +215,16 @@ carom_status crm_seal(carom_world *w)
     w->sub.n_contacts = 0;
     w->sealed = 1;
     return CAROM_OK;
+}
+
+carom_status crm_seal(carom_world *w)
+{
+    return seal(w, 0);
+}
+
+carom_status crm_seal_as_is(carom_world *w)
+{
+    return seal(w, 1);
 }
 
 carom_status carom_world_seal(carom_world *world)

@@ -9,6 +9,7 @@
 #include "carom/grad.h"
 #include "carom/query.h"
 #include "carom/shape.h"
+#include "carom/snapshot.h"
 #include "carom/world.h"
 #include "carom/world_query.h"
 #endif
