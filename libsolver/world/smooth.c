@@ -12,6 +12,8 @@ enum { MAX_NEWTON = 30 };
  * the sub-step is too long: there is no solution at this h. */
 static const double LOOSE = 1e3;
 static const double FAR = 1e2;
+/* Speeds beyond this are no error of second order but another solution [what forces can give]. */
+static const double GAIN = 1.5;
 
 /* Stage 1 aims at gap 0 and joint error 0; from farther off it goes there at no more than the
  * recovery speed, not at error / h, which in a short sub-step would be a kick.  Rows at q0. */
@@ -215,6 +217,36 @@ static int bounce_sides(const carom_world *w, const crm_substep *s, crm_solve *c
     return any;
 }
 
+/* Speed in the mass metric: sqrt(v' M v). */
+static double mass_speed(const carom_world *w, const double *v)
+{
+    double sum = 0;
+    for (int k = 0; k < w->island->n_bodies; k++) {
+        const int b = w->island->bodies[k];
+        const double *x = v + 3 * b;
+        sum += w->inertia[b] * x[0] * x[0] + w->mass[b] * (x[1] * x[1] + x[2] * x[2]);
+    }
+    return sqrt(sum);
+}
+
+/* What holds at rest does no work: |v| <= |v0| + h |W f + g| in the mass metric.  Far beyond that
+ * a sub-step has turned joints so far that Newton's method found another of their poses. */
+static int gains_energy(const carom_world *w, const crm_substep *s, const double *v)
+{
+    double a[3];
+    double push = 0;
+    double mass = 0;
+    for (int k = 0; k < w->island->n_bodies; k++) {
+        const int b = w->island->bodies[k];
+        if (w->bodies[b].type != CAROM_DYNAMIC) return 0;
+        crm_free_acceleration(w, b, a);
+        push += w->inertia[b] * a[0] * a[0] + w->mass[b] * (a[1] * a[1] + a[2] * a[2]);
+        mass += w->mass[b];
+    }
+    const double most = mass_speed(w, s->v0) + s->h * sqrt(push) + w->recovery * sqrt(mass);
+    return mass_speed(w, v) > GAIN * most;
+}
+
 /* Impacts within a sub-step that located none: it has moved as if plastic; its velocities are those
  * of one impact at its end, v1 = v0 + h (W f + g) + W J1' l.  *done = 0: nothing bounces. */
 static carom_status bounce(carom_world *w, crm_substep *s, int *done)
@@ -227,7 +259,8 @@ static carom_status bounce(carom_world *w, crm_substep *s, int *done)
     if (!bounce_sides(w, s, c)) return CAROM_OK;
     crm_free_velocity(w, s, s->v0, s->h);
     carom_status e = crm_solve_run(w, s, c, 1);
-    if (e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION) {
+    const int unsolved = e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION;
+    if (unsolved || (e >= 0 && gains_energy(w, s, c->v))) {
         s->restitution = 0;
         bounce_sides(w, s, c);
         e = crm_solve_run(w, s, c, 0);
@@ -252,6 +285,7 @@ carom_status crm_smooth(carom_world *w, double h)
     if (cleared < 0) return cleared;
     if (s->ahead) e = bounce(w, s, &done);
     if (e >= 0 && !done) e = stage_2(w, s);
+    if (e >= 0 && !done && gains_energy(w, s, s->v1)) return CAROM_E_NO_SOLUTION;
     return e < 0 || e > cleared ? e : cleared;
 }
 
