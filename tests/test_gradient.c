@@ -542,21 +542,81 @@ static void free_flight(void **state)
     carom_world_destroy(w);
 }
 
+/* A sliding box stops after v^2 / (2 mu g), wherever that falls within a step. */
+static void stopping_distance(void **state)
+{
+    (void)state;
+    static const double dts[3] = {1.0 / 60, 1.0 / 7, 0.31};
+    const double mu = 0.4;
+    const double v = 3;
+    const double g = 9.81;
+    for (int k = 0; k < 3; k++) {
+        scene_integrator = CAROM_LOCATED;
+        carom_world *w = scene_world(g, dts[k]);
+        scene_floor(w, 0.5, 0);
+        const int b = scene_box(w, 2, 0.5, 0.25, at(0, 0.25, 0), 0.3, 0);
+        scene_push(w, b, 0, v, 0);
+        whole x = gradient_of_final(w, (int)(1.5 / dts[k]), 3 * b + 1);
+        const double d = v * v / (2 * mu * g);
+        /* rounding over some hundred sub-steps */
+        assert_near_case("distance", k, carom_world_q(w)[3 * b + 1], d, 1e-12);
+        assert_near_case("d/dv", k, x.g.v0[3 * b + 1], v / (mu * g), 1e-10);
+        assert_near_case("d/dmu", k, x.g.friction[0] + x.g.friction[b], -d / mu, 1e-10 * d / mu);
+        assert_near_case("d/dg", k, x.g.gravity[1], d / g, 1e-10); /* gravity = -g */
+        assert_near_case("d/dm", k, x.g.mass[b], 0, 1e-10);
+        free_gradient(&x);
+        carom_world_destroy(w);
+    }
+    scene_integrator = CAROM_EULER;
+}
+
+/* A disc slides until t1 = v / (3 mu g) and rolls at 2 v / 3 from x1 = 5 v t1 / 6:
+ * x(T) = 2/3 v T + v^2 / (18 mu g). */
+static void slide_then_roll(void **state)
+{
+    (void)state;
+    static const double dts[3] = {1.0 / 60, 1.0 / 7, 0.25};
+    const double mu = 0.4;
+    const double v = 3;
+    const double g = 9.81;
+    for (int k = 0; k < 3; k++) {
+        const int n = (int)(1.5 / dts[k]);
+        const double T = n * dts[k];
+        scene_integrator = CAROM_LOCATED;
+        carom_world *w = scene_world(g, dts[k]);
+        scene_floor(w, 0.5, 0);
+        const int b = scene_disc(w, 2, 0.5, 0, 0.5, 0.3, 0);
+        scene_push(w, b, 0, v, 0);
+        whole x = gradient_of_final(w, n, 3 * b + 1);
+        const double c = v / (18 * mu * g);
+        assert_near_case("x", k, carom_world_q(w)[3 * b + 1], 2.0 / 3 * v * T + v * c, 1e-12);
+        assert_near_case("d/dv", k, x.g.v0[3 * b + 1], 2.0 / 3 * T + 2 * c, 1e-10);
+        assert_near_case("d/dmu", k, x.g.friction[0] + x.g.friction[b], -v * c / mu, 1e-10);
+        assert_near_case("d/ddt", k, x.g.dt[0], 2.0 / 3 * v * n, 1e-9);
+        free_gradient(&x);
+        carom_world_destroy(w);
+    }
+    scene_integrator = CAROM_EULER;
+}
+
 int main(void)
 {
     static const CMUnitTestFunction maps[3] = {against_differences, located_against_differences,
                                                fixed_against_differences};
-    struct CMUnitTest tests[3 * N_SCENES + 5];
+    struct CMUnitTest tests[3 * N_SCENES + 7];
     memset(tests, 0, sizeof tests);
     for (int k = 0; k < 3 * N_SCENES; k++) {
         tests[k].name = SCENES[k % N_SCENES].name;
         tests[k].test_func = maps[k / N_SCENES];
         tests[k].initial_state = (void *)(size_t)&SCENES[k % N_SCENES];
     }
-    const struct CMUnitTest closed[5] = {cmocka_unit_test(sliding_friction_sign),
+    const struct CMUnitTest closed[7] = {cmocka_unit_test(stopping_distance),
+                                         cmocka_unit_test(slide_then_roll),
+                                         cmocka_unit_test(sliding_friction_sign),
                                          cmocka_unit_test(wall_bounce),
                                          cmocka_unit_test(bounce_on_a_border),
-                                         cmocka_unit_test(head_on), cmocka_unit_test(free_flight)};
+                                         cmocka_unit_test(head_on),
+                                         cmocka_unit_test(free_flight)};
     memcpy(tests + 3 * N_SCENES, closed, sizeof closed);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -26,9 +26,9 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     const size_t k3 = 3 * (size_t)r->world->n_moving;
     const size_t rows = (size_t)r->world->n_joint_rows;
     crm_substep *s = &r->work;
-    double **const full[] = {&r->q_bar,     &r->v_bar, &r->q_seed,   &r->v_seed,  &r->q_event,
-                             &r->solve_bar, &r->pose,  &r->pose_bar, &r->q_after, &r->v_after,
-                             &s->q0,        &s->v0,    &s->q1,       &s->v1};
+    double **const full[] = {&r->q_bar, &r->v_bar,    &r->q_seed,  &r->v_seed,  &r->solve_bar,
+                             &r->pose,  &r->pose_bar, &r->q_after, &r->v_after, &s->q0,
+                             &s->v0,    &s->q1,       &s->v1};
     for (size_t k = 0; k < sizeof full / sizeof *full; k++) {
         *full[k] = crm_carve(b, n3, sizeof(double));
     }
@@ -142,49 +142,53 @@ static void unpack(crm_reverse *r, const crm_record *record)
     crm_copy(r->world, s->v1, r->v_after);
 }
 
-/* d gap / d q1 of the closing contact; scaled parameters go to the sink when scale is not 0. */
-static void event_vjp(crm_reverse *r, const crm_substep *s, double *q_event)
+/* The indicator g whose root ended the sub-step: the gap of its contact, or Jt v1.  Adds the
+ * cotangents of scale g at (q1, v1); parameters go to the sink when with_parameters. */
+static void event_vjp(crm_reverse *r, const crm_substep *s, double scale, double *q_bar,
+                      double *v_bar, int with_parameters)
 {
-    const carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, 1};
-    clear(q_event, 3 * (size_t)r->world->n_bodies);
-    crm_geometry_vjp(r, s->q1, &s->event, &bar, q_event, 0);
+    static const double none[6] = {0};
+    const crm_contact *c = &s->event;
+    carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, scale};
+    if (s->end == CRM_END_STOP) {
+        double jn[6];
+        double jt[6];
+        double jt_bar[6];
+        bar.gap = 0;
+        crm_contact_rows(c, jn, jt);
+        for (int i = 0; i < 6; i++) {
+            const int x = 3 * (i < 3 ? c->body_a : c->body_b) + i % 3;
+            v_bar[x] += scale * jt[i];
+            jt_bar[i] = scale * s->v1[x];
+        }
+        crm_contact_rows_vjp(c, none, jt_bar, &bar);
+    }
+    crm_geometry_vjp(r, s->q1, c, &bar, q_bar, with_parameters);
 }
 
-static void event_parameters(crm_reverse *r, const crm_substep *s, double scale)
-{
-    const carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, scale};
-    clear(r->q_seed, 3 * (size_t)r->world->n_bodies);
-    crm_geometry_vjp(r, s->q1, &s->event, &bar, r->q_seed, 1);
-}
-
-/* The sub-step ended at the root h* of a gap g: dh* = -(dg/dtheta) / (dg/dh).  With
- * H = h_bar - left_bar, the cotangent of h*, every derivative of g enters with k = -H / (dg/dh):
- * the seed k dg/dq1 is added to q_bar, and k dg/dparameter to the sink. */
+/* The sub-step ended at the root h* of g: dh* = -(dg/dtheta) / (dg/dh).  With H = h_bar - left_bar,
+ * the cotangent of h*, every derivative of g enters with k = -H / (dg/dh): the seeds k dg/dq1 and
+ * k dg/dv1 are added to q_bar and v_bar, and k dg/dparameter to the sink. */
 static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar)
 {
     const carom_world *w = r->world;
+    const double least = GRAZING * (s->end == CRM_END_STOP ? w->speed : w->length);
     double h_bar;
     double slope;
-    event_vjp(r, s, r->q_event);
     crm_copy(w, r->q_seed, r->q_bar);
     crm_copy(w, r->v_seed, r->v_bar);
     carom_status e = crm_substep_vjp(r, s, r->q_seed, r->v_seed, 0, &h_bar);
     if (e < 0) return e;
-    crm_copy(w, r->q_seed, r->q_event);
+    crm_zero(w, r->q_seed);
     crm_zero(w, r->v_seed);
+    event_vjp(r, s, 1, r->q_seed, r->v_seed, 0);
     e = crm_substep_vjp(r, s, r->q_seed, r->v_seed, 0, &slope);
     if (e < 0) return e;
-    if (fabs(slope) <= GRAZING * r->world->length) {
+    if (fabs(slope) <= least) {
         r->stats.degenerate++;
         return CAROM_OK;
     }
-    const double k = -(h_bar - left_bar) / slope;
-    const int ends[2] = {s->event.body_a, s->event.body_b};
-    for (int i = 0; i < 6; i++) {
-        const int x = 3 * ends[i / 3] + i % 3;
-        r->q_bar[x] += k * r->q_event[x];
-    }
-    event_parameters(r, s, k);
+    event_vjp(r, s, -(h_bar - left_bar) / slope, r->q_bar, r->v_bar, 1);
     return CAROM_OK;
 }
 
@@ -194,7 +198,7 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
     crm_substep *s = &r->work;
     double h_bar;
     unpack(r, &r->tape->records[record]);
-    if (s->end == CRM_END_EVENT) {
+    if (s->end == CRM_END_EVENT || s->end == CRM_END_STOP) {
         const carom_status e = locate_vjp(r, s, *left_bar);
         if (e < 0) return e;
     }
@@ -209,7 +213,8 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
     case CRM_END_FRAME: *left_bar = h_bar; break;
     case CRM_END_FRACTION: *left_bar = s->fraction * h_bar + (1 - s->fraction) * *left_bar; break;
     case CRM_END_IMPACT: break; /* no time passes */
-    case CRM_END_EVENT: break;  /* left_before = left_after + h*, and h* is in k */
+    case CRM_END_EVENT:
+    case CRM_END_STOP: break; /* left_before = left_after + h*, and h* is in k */
     }
     return CAROM_OK;
 }

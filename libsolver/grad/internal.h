@@ -48,7 +48,6 @@ typedef struct crm_reverse {
     double scale;          /* largest seed so far */
     double *q_bar, *v_bar; /* 3 n_bodies: state under way */
     double *q_seed, *v_seed;
-    double *q_event;      /* 3 n_bodies: d gap / d q1 */
     double *velocity_bar; /* 3 per body of the island */
     double *gap_bar;      /* per contact */
     carom_contact_bars bars;

@@ -88,7 +88,8 @@ typedef enum crm_end {
     CRM_END_FRAME,    /* h is all the time that was left */
     CRM_END_FRACTION, /* h = fraction * left, fraction constant */
     CRM_END_IMPACT,   /* no time passes */
-    CRM_END_EVENT     /* h is the root of the gap of `event` */
+    CRM_END_EVENT,    /* h is the root of the gap of `event` */
+    CRM_END_STOP      /* h is the root of the slip speed of `event` */
 } crm_end;
 
 /* One contact problem of a sub-step and its solution; docs/step.md.  Row data not used by a kind
@@ -133,6 +134,7 @@ typedef struct crm_substep {
     crm_contact *contacts;   /* geometry at q0 */
     crm_contact *moved;      /* the same contacts at the pose of the problem under way */
     unsigned char *pressing; /* per contact: closed by force, so held at gap 0 from both sides */
+    signed char *slips;      /* per contact: the sign of the slip that it is made to keep, or 0 */
     double *target;          /* per contact: gap that stage 1 aims at [m] */
     double *joint_target;    /* per joint row: error that stage 1 aims at [m] */
     double restitution;      /* factor on all restitutions: 1, or 0 when relaxed */
@@ -462,7 +464,9 @@ carom_status crm_map_run(carom_world *w, double h);
  * `first` and on.  CAROM_LIMIT when something is left. */
 carom_status crm_project(carom_world *w, crm_substep *s, int first);
 
-/* smooth.c: whether a contact of sub is hit now; keeps of sub.contacts those of the impact, or
+/* smooth.c: the fastest point of a body of the island [m/s]. */
+double crm_top_speed(const carom_world *w, const double *v);
+/* Whether a contact of sub is hit now; keeps of sub.contacts those of the impact, or
  * those that stay closed in smooth motion. */
 int crm_select_impact(carom_world *w);
 void crm_select_contacts(carom_world *w, int for_impact);
@@ -483,6 +487,23 @@ carom_vec2 crm_centers(const carom_world *w, const crm_contact *c, const double 
 
 /* slip.c: arc length that body B slips on body A along the tangent of a contact, from q0 to q1. */
 double crm_slip(const carom_world *w, const crm_contact *c, const double *q0, const double *q1);
+
+/* Something whose root ends a sub-step, of w->sub as evaluated for length h. */
+typedef struct crm_indicator {
+    double (*value)(const carom_world *w, const void *what, double h);
+    const void *what;
+    double start; /* > 0: at h = 0 */
+    double end;   /* <= 0: at the end of the bracket */
+    double tol;   /* of the value */
+} crm_indicator;
+/* h in (0, *h] where it is zero: Illinois, then bisection.  Leaves sub evaluated at *h. */
+carom_status crm_find_root(carom_world *w, const crm_indicator *f, double *h);
+
+/* stop.c: when a contact of sub that slips at q0 does not slip to the end, the sub-step ends where
+ * the first one stops. */
+carom_status crm_locate_stop(carom_world *w);
+/* Jt v of a contact at the pose it was evaluated at. */
+double crm_slip_speed(const crm_contact *c, const double *v);
 
 /* locate.c: S(left), or S of a fraction of it when that has no solution, or the Euler map. */
 carom_status crm_run_through(carom_world *w, double left);

@@ -251,14 +251,12 @@ static void first_closed(carom_world *w, watch *found, int *any)
     *found = f.best;
 }
 
-/* h in (0, *h] with gap(q1(h)) = 0: Illinois, then bisection.  Leaves sub evaluated at *h. */
-static carom_status find_root(carom_world *w, const watch *x, double *h)
+carom_status crm_find_root(carom_world *w, const crm_indicator *f, double *h)
 {
-    const double tol = ROOT_TOL * w->length + crm_rounding(w);
     double a = 0;
     double b = *h;
-    double ga = x->g0;
-    double gb = x->g1;
+    double ga = f->start;
+    double gb = f->end;
     int side = 0;
     for (int i = 0; i < MAX_ROOT_STEPS; i++) {
         double t = i < MAX_ROOT_STEPS / 2 ? (a * gb - b * ga) / (gb - ga) : 0.5 * (a + b);
@@ -266,8 +264,8 @@ static carom_status find_root(carom_world *w, const watch *x, double *h)
         const carom_status e = crm_map_run(w, t);
         if (e < 0) return e;
         *h = t;
-        const double g = watch_value(w, x, w->sub.q1, t);
-        if (fabs(x->opened ? g * t : g) <= tol || b - a <= 1e-16 * b) return CAROM_OK;
+        const double g = f->value(w, f->what, t);
+        if (fabs(g) <= f->tol || b - a <= 1e-16 * b) return CAROM_OK;
         if (g > 0) {
             a = t;
             ga = g;
@@ -281,6 +279,19 @@ static carom_status find_root(carom_world *w, const watch *x, double *h)
         }
     }
     return CAROM_OK;
+}
+
+static double gap_value(const carom_world *w, const void *what, double h)
+{
+    return watch_value(w, what, w->sub.q1, h);
+}
+
+static carom_status find_root(carom_world *w, const watch *x, double *h)
+{
+    const double tol = ROOT_TOL * w->length + crm_rounding(w);
+    /* An opened pair is searched by its mean speed: tol over the whole bracket is the sharpest. */
+    const crm_indicator f = {gap_value, x, x->g0, x->g1, x->opened ? tol / *h : tol};
+    return crm_find_root(w, &f, h);
 }
 
 /* The contact point that closes, for the derivative of the event time. */
@@ -405,6 +416,14 @@ carom_status crm_stop_passing(carom_world *w, double left)
     return CAROM_OK;
 }
 
+/* The sub-step as it is, or up to where the first slipping contact stops. */
+static carom_status stopped(carom_world *w, carom_status e)
+{
+    if (e < 0 || !w->smooth) return e;
+    const carom_status s = crm_locate_stop(w);
+    return s < 0 || s > e ? s : e;
+}
+
 carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
 {
     crm_substep *s = &w->sub;
@@ -414,17 +433,17 @@ carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
         watch x;
         int any;
         first_closed(w, &x, &any);
-        if (!any) return e;
+        if (!any) return stopped(w, e);
         *busy = any > allowed;
         if (*busy) return CAROM_OK;
         if (x.touches) {
             set_event(w, &x);
-            return e;
+            return stopped(w, e);
         }
         const double h = s->h * x.at;
         e = go_to_event(w, x, left);
         *busy = e >= 0 && s->h < NO_TIME * w->settings.dt;
-        if (!unsolved(e)) return e;
+        if (!unsolved(e)) return *busy ? e : stopped(w, e);
         e = halve(w, h, left, e);
     }
     return e;

@@ -30,11 +30,17 @@ static void set_targets(const carom_world *w, crm_substep *s)
     }
 }
 
+/* What makes a contact slip on in its direction: more than any slip speed. */
+static double drive(const carom_world *w, const crm_substep *s, int k)
+{
+    return s->slips[k] ? s->slips[k] * 8 * (crm_top_speed(w, s->v0) + w->speed) : 0;
+}
+
 static void first_sides(const carom_world *w, const crm_substep *s, crm_solve *c)
 {
     for (int k = 0; k < s->n_contacts; k++) {
         c->cn[k] = (s->contacts[k].gap - s->target[k]) / s->h;
-        c->ct[k] = 0;
+        c->ct[k] = drive(w, s, k);
     }
     for (int k = 0; k < w->island->n_rows; k++) {
         c->ce[k] = (w->rows.error[k] - s->joint_target[k]) / s->h;
@@ -71,8 +77,9 @@ static double next_sides(const carom_world *w, const crm_substep *s, const crm_s
         crm_contact_refresh(w, s->q1, &x);
         const double miss = x.gap - s->target[k];
         next->cn[k] = miss / s->h - un;
-        next->ct[k] = 0;
-        if (w->rows.mu[k] > 0) next->ct[k] = crm_slip(w, &x, s->q0, s->q1) / s->h - ut;
+        next->ct[k] = drive(w, s, k);
+        if (w->rows.mu[k] > 0 && !s->slips[k])
+            next->ct[k] = crm_slip(w, &x, s->q0, s->q1) / s->h - ut;
         if (c->mode[k] == CAROM_SEPARATED) {
             largest = fmax(largest, -miss);
             continue;
@@ -145,7 +152,7 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
     crm_free_velocity(w, s, last->v, 0.5 * s->h);
     for (int k = 0; k < s->n_contacts; k++) {
         c->cn[k] = s->moved[k].gap > slop ? s->moved[k].gap / s->h : 0;
-        c->ct[k] = 0;
+        c->ct[k] = drive(w, s, k);
         c->mode[k] = last->mode[k];
     }
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
@@ -176,7 +183,7 @@ static carom_status clear_errors(carom_world *w, crm_substep *s)
 }
 
 /* Fastest point of a body of the island [m/s]. */
-static double top_speed(const carom_world *w, const double *v)
+double crm_top_speed(const carom_world *w, const double *v)
 {
     double top = 0;
     for (int k = 0; k < w->island->n_bodies; k++) {
@@ -205,7 +212,7 @@ static double bounce_side(const carom_world *w, const crm_substep *s, int k, dou
 /* Right-hand sides of a bounce, rows at q1 in place; 1 when a contact bounces. */
 static int bounce_sides(const carom_world *w, const crm_substep *s, crm_solve *c)
 {
-    const double apart = 4 * top_speed(w, s->v0);
+    const double apart = 4 * crm_top_speed(w, s->v0);
     int any = 0;
     for (int k = 0; k < s->n_contacts; k++) {
         c->cn[k] = bounce_side(w, s, k, apart);
@@ -329,7 +336,7 @@ int crm_select_impact(carom_world *w)
 {
     crm_substep *s = &w->sub;
     const double hit = CRM_HIT_TOL * w->length + crm_rounding(w);
-    const double slow = CRM_REST_TOL * (top_speed(w, s->v0) + w->speed);
+    const double slow = CRM_REST_TOL * (crm_top_speed(w, s->v0) + w->speed);
     int any = 0;
     for (int k = 0; k < s->n_contacts; k++) {
         if (s->contacts[k].gap <= hit && approach(s, k) < -slow) any = 1;

@@ -122,7 +122,7 @@ static void finish_island(carom_world *w, double left)
 {
     carom_step_stats *t = w->stats;
     const crm_substep *s = &w->sub;
-    const int owes = s->end == CRM_END_EVENT || s->end == CRM_END_IMPACT;
+    const int owes = s->end == CRM_END_EVENT || s->end == CRM_END_STOP || s->end == CRM_END_IMPACT;
     for (int k = 0; k < w->island->n_bodies; k++) {
         w->carry[w->island->bodies[k]] = left;
         w->owes[w->island->bodies[k]] = (unsigned char)owes;

@@ -50,6 +50,7 @@ static void lay_contacts(const carom_world *w, int n, crm_block *b, void *object
     s->contacts = crm_carve(b, m, sizeof *s->contacts);
     s->moved = crm_carve(b, m, sizeof *s->moved);
     s->pressing = crm_carve(b, m, 1);
+    s->slips = crm_carve(b, m, 1);
     s->target = crm_carve(b, m, sizeof(double));
     for (int k = 0; k < CRM_MAX_SOLVES; k++) {
         crm_solve *c = &s->solve[k];
