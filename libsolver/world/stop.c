@@ -30,8 +30,9 @@ static double speed_left(const carom_world *w, const void *what, double h)
 static int slip_sign(const carom_world *w, const crm_substep *s, int k, double slow)
 {
     const crm_contact *c = &s->contacts[k];
-    const double mu =
-        crm_combine(w->settings.combine_friction, w->friction[c->body_a], w->friction[c->body_b]);
+    const double mu = c->limit ? 0
+                               : crm_combine(w->settings.combine_friction, w->friction[c->body_a],
+                                             w->friction[c->body_b]);
     const double u = crm_slip_speed(c, s->v0);
     if (!(mu > 0) || fabs(u) <= slow) return 0;
     return u > 0 ? 1 : -1;
