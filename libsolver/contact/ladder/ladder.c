@@ -107,6 +107,13 @@ static int try_interior(climb *c, carom_contact_stage stage, crm_interior_start 
     return polish(c, stage, done ? 1 : ROUNDS_POLISH) || done;
 }
 
+static int try_damped(climb *c)
+{
+    *c->unpolished = c->s->best_residual;
+    *c->stage = CAROM_STAGE_SWEEPS;
+    return crm_damped(c->s, DAMPED_STEPS);
+}
+
 /* From the guess; where that fails and there are many contacts, from the interior near it. */
 static int try_guess(climb *c, int use_guess)
 {
@@ -118,7 +125,7 @@ static int try_guess(climb *c, int use_guess)
     if (try_modes(c, CAROM_STAGE_GUESS, ROUNDS_GUESS)) return 1;
     if (s->nc < MANY || !(s->best_residual < HUGE_VAL)) return 0;
     crm_vec_copy(s, s->x, s->best);
-    return try_interior(c, CAROM_STAGE_INTERIOR_POINT, near);
+    return try_interior(c, CAROM_STAGE_INTERIOR_POINT, near) || try_damped(c);
 }
 
 /* Without a guess to follow. */
@@ -189,13 +196,6 @@ static int try_restarts(climb *c)
         if (i > 2 && c->s->best_residual <= c->s->inexact) return 0;
     }
     return 0;
-}
-
-static int try_damped(climb *c)
-{
-    *c->unpolished = c->s->best_residual;
-    *c->stage = CAROM_STAGE_SWEEPS;
-    return crm_damped(c->s, DAMPED_STEPS);
 }
 
 /* The rungs for what neither a guess nor the first interior point solved. */
