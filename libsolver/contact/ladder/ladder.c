@@ -2,8 +2,9 @@
 
 #include <math.h>
 
-/* Residual of guessed impulses that need no solve; far below `accept`, so that the solution stays a
- * smooth function of the data, for differences too [1]. */
+/* Guessed impulses need no solve when each row holds to the rounding of its own terms, or to this;
+ * far below `accept`, so that the solution stays a smooth function of the data, for differences
+ * too [1]. */
 #define GUESS_EXACT 1e-14
 
 enum {
@@ -74,29 +75,61 @@ static int try_modes(climb *c, carom_contact_stage stage, int rounds)
     return done;
 }
 
-/* The equations and inequalities of contact k's mode hold at the point last measured. */
-static int mode_fits(const crm_island *s, int k)
+/* Rounding of a row at the point last measured: of |c| + |J| (|v| + |u| + |J|' |l|). */
+static double row_rounding(const crm_island *s, const double *row, int a, int b, double c)
 {
-    const double tiny = 10 * GUESS_EXACT;
-    const double ln = s->x.n[k];
-    const double bound = s->contact[k].mu * ln;
-    const double sign = crm_slip_sign(s->mode[k]);
-    if (s->mode[k] == CAROM_SEPARATED) return fabs(ln) <= tiny && s->an[k] >= -tiny;
-    if (!(fabs(s->an[k]) <= tiny && ln >= -tiny)) return 0;
-    if (sign != 0) return fabs(s->x.t[k] - sign * bound) <= tiny && sign * s->ut[k] <= tiny;
-    return fabs(s->ut[k]) <= tiny && fabs(s->x.t[k]) <= bound + tiny;
+    double terms = fabs(c);
+    for (int i = 0; a >= 0 && i < 3; i++) terms += fabs(row[i]) * s->size[3 * a + i];
+    for (int i = 0; b >= 0 && i < 3; i++) terms += fabs(row[3 + i]) * s->size[3 * b + i];
+    return fmax(GUESS_EXACT, CRM_ROUNDING * terms);
 }
 
-/* Guessed impulses that fit as they are: nothing has changed. */
+/* The equations and inequalities of contact k's mode hold at the point last measured. */
+static int mode_fits(const crm_island *s, int k, unsigned char mode, double tiny_n, double tiny_t)
+{
+    const double ln = s->x.n[k];
+    const double bound = s->contact[k].mu * ln;
+    const double sign = crm_slip_sign(mode);
+    if (mode == CAROM_SEPARATED) return fabs(ln) <= tiny_n && s->an[k] >= -tiny_n;
+    if (!(fabs(s->an[k]) <= tiny_n && ln >= -tiny_n)) return 0;
+    if (sign != 0) return fabs(s->x.t[k] - sign * bound) <= tiny_t && sign * s->ut[k] <= tiny_t;
+    return fabs(s->ut[k]) <= tiny_t && fabs(s->x.t[k]) <= bound + tiny_t;
+}
+
+/* The mode in which contact k obeys its laws to rounding, its present one first; -1: none. */
+static int exact_mode(const crm_island *s, int k)
+{
+    const crm_contact *c = &s->contact[k];
+    const double tiny_n = row_rounding(s, c->n, c->a, c->b, c->cn);
+    const double tiny_t = row_rounding(s, c->t, c->a, c->b, c->ct);
+    const int to = crm_contact_mode_of(c, s->x.n[k], s->x.t[k], s->an[k], s->ut[k]);
+    if (mode_fits(s, k, s->mode[k], tiny_n, tiny_t)) return s->mode[k];
+    return mode_fits(s, k, (unsigned char)to, tiny_n, tiny_t) ? to : -1;
+}
+
+static int group_is_exact(const crm_island *s, int q, const double *defect)
+{
+    const crm_group *g = &s->group[q];
+    for (int r = 0; r < CRM_GROUP_ROWS; r++) {
+        const double tiny = row_rounding(s, g->j[r], g->a, g->b, g->c[r]);
+        if (!(fabs(defect[3 * (s->nb + q) + r]) <= tiny)) return 0;
+    }
+    return 1;
+}
+
+/* Guessed impulses that fit as they are: nothing has changed.  (Where something has, its rows see
+ * more than the rounding of their own terms.) */
 static int guess_is_exact(crm_island *s)
 {
-    const double r = crm_island_residual(s, s->x);
-    if (!(r <= GUESS_EXACT)) return 0;
-    for (int k = 0; k < s->nc; k++) {
-        if (mode_fits(s, k)) continue;
-        s->mode[k] = (unsigned char)crm_contact_mode_of(&s->contact[k], s->x.n[k], s->x.t[k],
-                                                        s->an[k], s->ut[k]);
+    const double r = crm_island_residual(s, s->x); /* leaves the sizes, and the defect in rest */
+    if (!(r <= s->accept)) return 0;
+    for (int q = 0; q < s->ng; q++) {
+        if (!group_is_exact(s, q, s->rest.z)) return 0;
     }
+    for (int k = 0; k < s->nc; k++) {
+        if (exact_mode(s, k) < 0) return 0;
+    }
+    for (int k = 0; k < s->nc; k++) s->mode[k] = (unsigned char)exact_mode(s, k);
     return crm_island_offer(s, s->x, r);
 }
 
