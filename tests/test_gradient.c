@@ -416,6 +416,18 @@ static void located_against_differences(void **state)
     scene_integrator = CAROM_EULER;
 }
 
+static void sixth_order_against_differences(void **state)
+{
+    /* Its boxes sink in by 1e-5 so that faces meet: at this order the events of their first
+     * millisecond make differences of gravity noisy by 1e-6. */
+    if (((const scene *)*state)->build == pushed_stack) skip();
+    scene_integrator = CAROM_LOCATED;
+    scene_order = 6;
+    check_scene(*state);
+    scene_integrator = CAROM_EULER;
+    scene_order = 2;
+}
+
 static void fixed_against_differences(void **state)
 {
     scene_integrator = CAROM_FIXED;
@@ -601,11 +613,12 @@ static void slide_then_roll(void **state)
 
 int main(void)
 {
-    static const CMUnitTestFunction maps[3] = {against_differences, located_against_differences,
+    static const CMUnitTestFunction maps[4] = {against_differences, located_against_differences,
+                                               sixth_order_against_differences,
                                                fixed_against_differences};
-    struct CMUnitTest tests[3 * N_SCENES + 7];
+    struct CMUnitTest tests[4 * N_SCENES + 7];
     memset(tests, 0, sizeof tests);
-    for (int k = 0; k < 3 * N_SCENES; k++) {
+    for (int k = 0; k < 4 * N_SCENES; k++) {
         tests[k].name = SCENES[k % N_SCENES].name;
         tests[k].test_func = maps[k / N_SCENES];
         tests[k].initial_state = (void *)(size_t)&SCENES[k % N_SCENES];
@@ -617,6 +630,6 @@ int main(void)
                                          cmocka_unit_test(bounce_on_a_border),
                                          cmocka_unit_test(head_on),
                                          cmocka_unit_test(free_flight)};
-    memcpy(tests + 3 * N_SCENES, closed, sizeof closed);
+    memcpy(tests + 4 * N_SCENES, closed, sizeof closed);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

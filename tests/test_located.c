@@ -129,6 +129,95 @@ static double pendulum_error(int n)
     return error;
 }
 
+/* Three links released from a bent rest, or a disc rolling off a disc: the pose of the last body.
+ */
+static void swing(int kind, int order, int n, double *q)
+{
+    scene_order = order;
+    carom_world *w = scene_world(9.81, (kind ? 0.3 : 0.8) / n);
+    scene_order = 2;
+    int last = scene_anchor(w);
+    if (kind == 0) {
+        carom_vec2 pin = {0, 0};
+        for (int k = 0; k < 3; k++) {
+            const double a = 1 + 0.2 * k;
+            const carom_pose pose = {a, pin.x + 0.5 * sin(a), pin.y - 0.5 * cos(a)};
+            const int b = scene_box(w, 1, 0.05, 0.5, pose, 0, 0);
+            assert_int_equal(carom_world_add_revolute(w, last, b, pin, NULL), CAROM_OK);
+            pin.x += sin(a);
+            pin.y -= cos(a);
+            last = b;
+        }
+    } else {
+        const carom_vec2 center = {0, 0};
+        const carom_shape round = {1, 1, &center};
+        carom_body_def d = carom_body_defaults();
+        d.type = CAROM_STATIC;
+        d.shapes = &round;
+        d.n_shapes = 1;
+        d.friction = 0.9;
+        assert_int_equal(carom_world_add_body(w, &d, NULL), CAROM_OK);
+        last = scene_disc(w, 1, 0.3, 1.3 * sin(0.3), 1.3 * cos(0.3), 0.9, 0);
+    }
+    scene_run(w, n, NULL);
+    for (int k = 0; k < 3; k++) q[k] = q_of(w, last)[k];
+    carom_world_destroy(w);
+}
+
+static double swing_error(int kind, int order, int n, const double *exact)
+{
+    double q[3];
+    double error = 0;
+    swing(kind, order, n, q);
+    for (int k = 0; k < 3; k++) error = fmax(error, fabs(q[k] - exact[k]));
+    return error;
+}
+
+/* log2 of the ratio of errors from n to 2 n steps is the order.  The reference has order 8 and is
+ * good to 1e-12, rounding; the coarse steps keep all errors above that. */
+static void orders_are_what_they_say(void **state)
+{
+    (void)state;
+    static const int coarse[2][3] = {{60, 20, 10}, {20, 6, 0}};
+    for (int kind = 0; kind < 2; kind++) {
+        double exact[3];
+        swing(kind, 8, 480, exact);
+        for (int order = 2; order <= (kind ? 4 : 6); order += 2) {
+            const int n = coarse[kind][order / 2 - 1];
+            const double e = swing_error(kind, order, n, exact);
+            const double ratio = log2(e / swing_error(kind, order, 2 * n, exact));
+            if (fabs(ratio - order) > 0.5) {
+                fail_msg("kind %d, order %d: error %g, observed order %g", kind, order, e, ratio);
+            }
+        }
+        /* rounding of a hundred sub-steps; the smooth motion of the disc gets there at order 6 */
+        if (kind) assert_at_most("order 6", swing_error(kind, 6, 20, exact), 1e-12);
+        assert_at_most("order 8", swing_error(kind, 8, 40, exact), 1e-10);
+    }
+}
+
+/* The estimate is that of the order below: above the error, and going to zero with its order. */
+static void estimate_is_above_the_error(void **state)
+{
+    (void)state;
+    scene_order = 4;
+    carom_world *w = scene_world(9.81, 1.0 / 60);
+    scene_order = 2;
+    const carom_vec2 pin = {0, 0};
+    scene_anchor(w);
+    const int b = scene_box(w, 1, 0.05, 0.5, (carom_pose){0.5 * acos(-1), 0.5, 0}, 0, 0);
+    assert_int_equal(carom_world_add_revolute(w, 0, b, pin, NULL), CAROM_OK);
+    const double energy = carom_world_energy(w);
+    for (int k = 0; k < 60; k++) {
+        carom_step_stats s;
+        scene_run(w, 1, &s);
+        assert_true(s.estimate > 0 && s.estimate < 1e-3);
+        assert_near(s.energy, energy, 1e-6 * 9.81);
+        assert_true(s.joint_drift < 1e-13);
+    }
+    carom_world_destroy(w);
+}
+
 static void pendulum_is_second_order(void **state)
 {
     (void)state;
@@ -181,6 +270,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bouncing_ball),
         cmocka_unit_test(elastic_energy),
+        cmocka_unit_test(orders_are_what_they_say),
+        cmocka_unit_test(estimate_is_above_the_error),
         cmocka_unit_test(slide_to_roll),
         cmocka_unit_test(sliding_box_turns_back),
         cmocka_unit_test(pendulum_is_second_order),

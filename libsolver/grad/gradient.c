@@ -20,22 +20,29 @@ static int most_contacts(const carom_tape *t)
     return n;
 }
 
+static void lay_unpacked(crm_unpacked *u, crm_block *b, size_t n3)
+{
+    double **const states[] = {&u->q0, &u->v0, &u->q1, &u->v1};
+    for (int k = 0; k < 4; k++) *states[k] = crm_carve(b, n3, sizeof(double));
+    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
+        u->solve_q[k] = crm_carve(b, n3, sizeof(double));
+        u->solve_v[k] = crm_carve(b, n3, sizeof(double));
+    }
+}
+
 static void lay(crm_reverse *r, crm_block *b, size_t m)
 {
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
     const size_t k3 = 3 * (size_t)r->world->n_moving;
     const size_t rows = (size_t)r->world->n_joint_rows;
-    crm_substep *s = &r->work;
-    double **const full[] = {&r->q_bar, &r->v_bar,    &r->q_seed,  &r->v_seed,  &r->solve_bar,
-                             &r->pose,  &r->pose_bar, &r->q_after, &r->v_after, &s->q0,
-                             &s->v0,    &s->q1,       &s->v1};
+    double **const full[] = {&r->q_bar,    &r->v_bar,    &r->q_seed,  &r->v_seed,  &r->solve_bar,
+                             &r->pose,     &r->pose_bar, &r->q_after, &r->v_after, &r->column_q,
+                             &r->column_v, &r->start_q,  &r->start_v};
     for (size_t k = 0; k < sizeof full / sizeof *full; k++) {
         *full[k] = crm_carve(b, n3, sizeof(double));
     }
-    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
-        r->solve_q[k] = crm_carve(b, n3, sizeof(double));
-        r->solve_v[k] = crm_carve(b, n3, sizeof(double));
-    }
+    lay_unpacked(&r->work, b, n3);
+    if (r->world->settings.order > 2) lay_unpacked(&r->inner, b, n3);
     r->clock_bar = crm_carve(b, (size_t)r->world->n_bodies, sizeof(double));
     r->clock_old = crm_carve(b, (size_t)r->world->n_bodies, sizeof(double));
     r->velocity_bar = crm_carve(b, k3, sizeof(double));
@@ -113,33 +120,26 @@ static void scatter(const crm_island *i, const double *from, double *to)
     }
 }
 
-/* The recorded sub-step with states of world size, in r->work; its island is entered. */
-static void unpack(crm_reverse *r, const crm_record *record)
+void crm_unpack(crm_reverse *r, const crm_record *record, crm_unpacked *to)
 {
     const crm_island *i = &record->island;
-    crm_substep *s = &r->work;
-    double *const q0 = s->q0;
-    double *const v0 = s->v0;
-    double *const q1 = s->q1;
-    double *const v1 = s->v1;
+    crm_substep *s = &to->s;
     *s = record->s;
     s->moved = r->moved;
-    s->q0 = q0;
-    s->v0 = v0;
-    s->q1 = q1;
-    s->v1 = v1;
+    s->q0 = to->q0;
+    s->v0 = to->v0;
+    s->q1 = to->q1;
+    s->v1 = to->v1;
     scatter(i, record->s.q0, s->q0);
     scatter(i, record->s.v0, s->v0);
     for (int k = 0; k < s->n_solves; k++) {
         const crm_solve *c = &record->s.solve[k];
-        s->solve[k].q = c->q ? r->solve_q[k] : s->q0;
-        s->solve[k].v = r->solve_v[k];
+        s->solve[k].q = c->q ? to->solve_q[k] : s->q0;
+        s->solve[k].v = to->solve_v[k];
         if (c->q) scatter(i, c->q, s->solve[k].q);
         scatter(i, c->v, s->solve[k].v);
     }
     crm_enter(r->world, i);
-    crm_copy(r->world, s->q1, r->q_after);
-    crm_copy(r->world, s->v1, r->v_after);
 }
 
 /* The indicator g whose root ended the sub-step: the gap of its contact, or Jt v1.  Adds the
@@ -195,9 +195,12 @@ static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar)
 /* One sub-step backward; *left_bar is the cotangent of the time left after it, then before it. */
 static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
 {
-    crm_substep *s = &r->work;
+    crm_substep *s = &r->work.s;
     double h_bar;
-    unpack(r, &r->tape->records[record]);
+    r->record = record;
+    crm_unpack(r, &r->tape->records[record], &r->work);
+    crm_copy(r->world, s->q1, r->q_after);
+    crm_copy(r->world, s->v1, r->v_after);
     if (s->end == CRM_END_EVENT || s->end == CRM_END_STOP) {
         const carom_status e = locate_vjp(r, s, *left_bar);
         if (e < 0) return e;
@@ -277,6 +280,7 @@ static carom_status reverse_frame(crm_reverse *r, int frame)
         if (k == end - 1 || records[k + 1].which != x->which) left_bar = open_island(r, x);
         const carom_status e = reverse_record(r, k, &left_bar);
         if (e < 0) return e;
+        if (x->s.map == CRM_MAP_EXTRAPOLATED) k -= x->s.n_inner; /* those before it are its own */
         if (k == first || records[k - 1].which != x->which) close_island(r, x, left_bar);
     }
     double *const swap = r->clock_bar;
@@ -286,18 +290,24 @@ static carom_status reverse_frame(crm_reverse *r, int frame)
     return CAROM_OK;
 }
 
+static void place_statics(crm_unpacked *u, const double *q, size_t n3)
+{
+    memcpy(u->q0, q, n3 * sizeof *q);
+    memcpy(u->q1, q, n3 * sizeof *q);
+    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
+        memcpy(u->solve_q[k], q, n3 * sizeof *q);
+        clear(u->solve_v[k], n3);
+    }
+}
+
 static carom_status reverse_all(crm_reverse *r, int n_bars, const carom_state_bar *bars)
 {
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
     const carom_tape *t = r->tape;
-    double *const states[] = {r->work.q0, r->work.q1, r->pose, r->q_after};
-    for (size_t k = 0; k < sizeof states / sizeof *states; k++) {
-        memcpy(states[k], t->q_end, n3 * sizeof(double));
-    }
-    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
-        memcpy(r->solve_q[k], t->q_end, n3 * sizeof(double));
-        clear(r->solve_v[k], n3);
-    }
+    memcpy(r->pose, t->q_end, n3 * sizeof(double));
+    memcpy(r->q_after, t->q_end, n3 * sizeof(double));
+    place_statics(&r->work, t->q_end, n3);
+    if (r->world->settings.order > 2) place_statics(&r->inner, t->q_end, n3);
     memcpy(r->v_after, t->v_end, n3 * sizeof(double));
     clear(r->clock_bar, (size_t)r->world->n_bodies);
     clear(r->q_bar, n3);

@@ -40,6 +40,13 @@ typedef struct crm_sink {
     double *force_step; /* 3 n_bodies: row of g.force_steps for the step under way */
 } crm_sink;
 
+/* A recorded sub-step with states of world size. */
+typedef struct crm_unpacked {
+    crm_substep s;
+    double *q0, *v0, *q1, *v1; /* 3 n_bodies, like all below */
+    double *solve_q[CRM_MAX_SOLVES], *solve_v[CRM_MAX_SOLVES];
+} crm_unpacked;
+
 /* Workspace of a reverse pass. */
 typedef struct crm_reverse {
     carom_tape *tape;
@@ -51,19 +58,24 @@ typedef struct crm_reverse {
     double *velocity_bar; /* 3 per body of the island */
     double *gap_bar;      /* per contact */
     carom_contact_bars bars;
-    double *solve_bar;  /* 3 n_bodies: cotangent of the velocity of the solve under way */
-    double *pose;       /* 3 n_bodies: end of an iteration of stage 1 */
-    double *pose_bar;   /* 3 n_bodies: its cotangent */
-    crm_contact *moved; /* contacts at the pose of the problem under way */
-    crm_substep work;   /* the sub-step under way, states of world size */
-    double *solve_q[CRM_MAX_SOLVES], *solve_v[CRM_MAX_SOLVES]; /* its arrays */
-    double *q_after, *v_after;                                 /* 3 n_bodies: state after it */
+    double *solve_bar;           /* 3 n_bodies: cotangent of the velocity of the solve under way */
+    double *pose;                /* 3 n_bodies: end of an iteration of stage 1 */
+    double *pose_bar;            /* 3 n_bodies: its cotangent */
+    crm_contact *moved;          /* contacts at the pose of the problem under way */
+    int record;                  /* under way */
+    crm_unpacked work, inner;    /* the sub-step under way, and one within it */
+    double *column_q, *column_v; /* 3 n_bodies: cotangents within a column of an extrapolated map */
+    double *start_q, *start_v;   /* ... and at the start of all */
+    double *q_after, *v_after;   /* 3 n_bodies: state after it */
     double *clock_bar, *clock_old; /* per body: cotangent of the time owed to the next step, of the
                                     * frame under way and of the one after it */
     void *block;
     size_t bytes;
     carom_gradient_stats stats;
 } crm_reverse;
+
+/* gradient.c: the recorded sub-step into `to`; its island is entered. */
+void crm_unpack(crm_reverse *r, const crm_record *record, crm_unpacked *to);
 
 /* geometry.c: reverse derivatives of rows and gaps; each adds. */
 void crm_contact_rows_vjp(const crm_contact *c, const double jn_bar[6], const double jt_bar[6],
@@ -124,6 +136,8 @@ carom_status crm_euler_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double
                            int with_parameters, double *h_bar);
 carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
                             int with_parameters, double *h_bar);
+carom_status crm_extrapolated_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
+                                  int with_parameters, double *h_bar);
 carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
                             int with_parameters);
 carom_status crm_substep_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,

@@ -207,6 +207,8 @@ carom_status crm_substep_vjp(crm_reverse *r, crm_substep *s, double *q_bar, doub
     switch (s->map) {
     case CRM_MAP_IMPACT: return crm_impact_vjp(r, s, q_bar, v_bar, with_parameters);
     case CRM_MAP_SMOOTH: return crm_smooth_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+    case CRM_MAP_EXTRAPOLATED:
+        return crm_extrapolated_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
     case CRM_MAP_EULER: break;
     }
     return crm_euler_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);

@@ -30,8 +30,7 @@ static void keep_solve(const crm_island *i, const crm_substep *s, int index, crm
     const crm_solve *c = &s->solve[index];
     const size_t m = (size_t)s->n_contacts;
     const size_t rows = (size_t)i->n_rows;
-    const int own_pose =
-        c->kind == CRM_CORRECTION || c->kind == CRM_STAGE_2 || c->kind == CRM_BOUNCE;
+    const int own_pose = c->kind != CRM_VELOCITY && c->kind != CRM_IMPACT && c->kind != CRM_STAGE_1;
     to->q = own_pose ? keep_state(i, c->q, b) : NULL;
     to->v = keep_state(i, c->v, b);
     to->cn = keep(b, c->cn, m, sizeof(double));

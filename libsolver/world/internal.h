@@ -99,9 +99,11 @@ typedef enum crm_solve_kind {
     CRM_VELOCITY,   /* Euler: v1 from rows at q0 */
     CRM_CORRECTION, /* displacement v from rows at q, frictionless */
     CRM_IMPACT,     /* v1 from v0, no time passes */
-    CRM_STAGE_1, /* smooth: velocity over the sub-step, rows at q0, right-hand sides at its end */
-    CRM_STAGE_2, /* smooth: v1 from rows at q1 */
-    CRM_BOUNCE   /* in place of stage 2: v1 from v0 and all of h, with restitution */
+    CRM_STAGE_1,   /* smooth: velocity over the sub-step, rows at q0, right-hand sides at its end */
+    CRM_STAGE_2,   /* smooth: v1 from rows at q1 */
+    CRM_BOUNCE,    /* in place of stage 2: v1 from v0 and all of h, with restitution */
+    CRM_HOLD,      /* displacement v onto the active constraints at q, equations of the modes */
+    CRM_HOLD_SPEED /* v1 onto the active constraints at q1 */
 } crm_solve_kind;
 
 typedef struct crm_solve {
@@ -119,7 +121,13 @@ typedef struct crm_solve {
 } crm_solve;
 
 /* The maps that a sub-step can be. */
-typedef enum crm_map { CRM_MAP_EULER, CRM_MAP_SMOOTH, CRM_MAP_IMPACT } crm_map;
+typedef enum crm_map {
+    CRM_MAP_EULER,
+    CRM_MAP_SMOOTH,
+    CRM_MAP_IMPACT,
+    CRM_MAP_EXTRAPOLATED /* a combination of chains of smooth ones */
+} crm_map;
+enum { CRM_MAX_COLUMNS = 4, CRM_MAX_INNER = 10, CRM_MAX_HOLDS = 4 };
 
 /* Everything about one sub-step: what the reverse pass needs, no more. */
 typedef struct crm_substep {
@@ -139,6 +147,9 @@ typedef struct crm_substep {
     double *joint_target;    /* per joint row: error that stage 1 aims at [m] */
     double restitution;      /* factor on all restitutions: 1, or 0 when relaxed */
     int ahead;               /* 1: contacts are all that may close; impacts are not located */
+    int n_inner;             /* of an extrapolated map: its smooth sub-steps */
+    double weight[CRM_MAX_COLUMNS]; /* ... of its columns */
+    double estimate;                /* of its error [m] */
     int n_solves;
     crm_solve solve[CRM_MAX_SOLVES];
     crm_end end;
@@ -263,7 +274,8 @@ struct carom_world {
     carom_contact_solver *solver;
     crm_rows rows;
     crm_substep sub;
-    double *q_saved, *v_saved; /* 3 n_bodies: for a failed step */
+    crm_substep inner[CRM_MAX_INNER]; /* of an extrapolated map; made when order > 2 */
+    double *q_saved, *v_saved;        /* 3 n_bodies: for a failed step */
     double *carry; /* per body: time owed to the next step, 0 but for rounding and derivative */
     unsigned char *owes; /* per body: the last step ended with an event */
     double *carry_saved;
@@ -452,6 +464,16 @@ carom_status crm_touches_save(carom_world *w);
 void crm_forget_guesses(carom_world *w);
 /* The frame is done: next becomes the touches, ordered. */
 void crm_touches_turn(carom_world *w);
+
+/* Modes and impulses, times a factor, of the first two solves from one sub-step to another. */
+void crm_guess_copy(const carom_world *w, const crm_substep *from, crm_substep *to, double factor);
+
+/* extrapolate.c: of order settings.order > 2. */
+carom_status crm_extrapolate(carom_world *w, double h);
+/* Whether a hold keeps the tangent of contact k, rows in place. */
+int crm_holds_tangent(const carom_world *w, const crm_substep *s, int k);
+/* The problem of a CRM_HOLD or CRM_HOLD_SPEED, rows in place; changes rows.mu. */
+carom_contact_problem crm_hold_problem(carom_world *w, const crm_substep *s, const crm_solve *c);
 
 /* The maps: from (q0, v0) of w->sub to (q1, v1). */
 carom_status crm_euler(carom_world *w, double h);  /* euler.c */

@@ -68,7 +68,9 @@ static void fill_contacts(carom_world *w, const crm_substep *s)
         crm_contact_rows(c, &r->jn[6 * k], &r->jt[6 * k]);
         r->mu[k] = crm_combine(w->settings.combine_friction, w->friction[c->body_a],
                                w->friction[c->body_b]);
-        if (c->limit || (s->map == CRM_MAP_SMOOTH && sharp(w, c))) r->mu[k] = 0;
+        if (c->limit ||
+            ((s->map == CRM_MAP_SMOOTH || s->map == CRM_MAP_EXTRAPOLATED) && sharp(w, c)))
+            r->mu[k] = 0;
     }
 }
 
@@ -181,6 +183,11 @@ carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const cr
     case CRM_STAGE_1: crm_free_velocity(w, s, s->v0, 0.5 * s->h); break;
     case CRM_STAGE_2: crm_free_velocity(w, s, c[-1].v, 0.5 * s->h); break;
     case CRM_BOUNCE: crm_free_velocity(w, s, s->v0, s->h); break;
+    case CRM_HOLD:
+    case CRM_HOLD_SPEED:
+        /* The velocity before it is not known here, and no derivative asks for it. */
+        memset(w->rows.u, 0, 3 * (size_t)w->island->n_bodies * sizeof(double));
+        return crm_hold_problem(w, s, c);
     }
     return crm_problem(w, s, c);
 }

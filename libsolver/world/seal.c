@@ -108,6 +108,10 @@ static carom_status allocate(carom_world *w)
     carom_status e = crm_rows_create(w);
     if (!e) e = crm_islands_create(w);
     if (!e) e = crm_substep_create(w, &w->sub);
+    const int columns = w->settings.order / 2;
+    for (int k = 0; !e && columns > 1 && k < columns * (columns + 1) / 2; k++) {
+        e = crm_substep_create(w, &w->inner[k]);
+    }
     return e;
 }
 

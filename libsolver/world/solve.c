@@ -134,6 +134,20 @@ void crm_guess_load(carom_world *w, double h)
     }
 }
 
+void crm_guess_copy(const carom_world *w, const crm_substep *from, crm_substep *to, double factor)
+{
+    for (int i = 0; i < 2; i++) {
+        for (int k = 0; k < to->n_contacts; k++) {
+            to->solve[i].mode[k] = from->solve[i].mode[k];
+            to->solve[i].ln[k] = factor * from->solve[i].ln[k];
+            to->solve[i].lt[k] = factor * from->solve[i].lt[k];
+        }
+        for (int k = 0; k < w->island->n_rows; k++) {
+            to->solve[i].le[k] = factor * from->solve[i].le[k];
+        }
+    }
+}
+
 /* Impulses per time of solve i of sub; an impact has none. */
 static double per_time(const crm_substep *s, int i)
 {
@@ -144,7 +158,7 @@ static double per_time(const crm_substep *s, int i)
 /* Impulse over the whole sub-step: both stages give one half. */
 static double whole(const crm_substep *s, double first, double second)
 {
-    if (s->map != CRM_MAP_SMOOTH) return first;
+    if (s->map != CRM_MAP_SMOOTH && s->map != CRM_MAP_EXTRAPOLATED) return first;
     return s->solve[1].kind == CRM_BOUNCE ? second : first + second;
 }
 
@@ -232,5 +246,6 @@ void crm_touches_turn(carom_world *w)
 
 carom_status crm_map_run(carom_world *w, double h)
 {
-    return w->smooth ? crm_smooth(w, h) : crm_euler(w, h);
+    if (!w->smooth) return crm_euler(w, h);
+    return w->settings.order > 2 && !w->sub.ahead ? crm_extrapolate(w, h) : crm_smooth(w, h);
 }

@@ -25,7 +25,7 @@ static void begin_substep(carom_world *w)
 static carom_status find_contacts(carom_world *w, double left, int last)
 {
     const double margin = w->settings.margin * w->length;
-    w->sub.ahead = last;
+    w->sub.ahead = last && (w->island->n_pairs || w->island->n_limited);
     if (!last) return crm_detect(w, w->q, margin);
     return crm_detect_ahead(w, w->q, w->v, left, margin);
 }
@@ -44,8 +44,11 @@ static int bounced(const crm_substep *s)
 static carom_status commit(carom_world *w)
 {
     const crm_substep *s = &w->sub;
+    const crm_recorder *r = &w->recorder;
     carom_status e = crm_touches_save(w);
-    if (!e && w->recorder.substep) e = w->recorder.substep(w->recorder.user, s);
+    const int n_inner = s->map == CRM_MAP_EXTRAPOLATED ? s->n_inner : 0;
+    for (int k = 0; !e && r->substep && k < n_inner; k++) e = r->substep(r->user, &w->inner[k]);
+    if (!e && r->substep) e = r->substep(r->user, s);
     if (e) return e;
     crm_copy(w, w->q, s->q1);
     crm_copy(w, w->v, s->v1);
@@ -55,6 +58,7 @@ static carom_status commit(carom_world *w)
     w->stats->n_events +=
         s->map == CRM_MAP_EULER ? s->end == CRM_END_EVENT || bounced(s) : bounced(s);
     w->stats->degenerate += s->degenerate;
+    w->stats->estimate += s->map == CRM_MAP_EXTRAPOLATED ? s->estimate : 0;
     return CAROM_OK;
 }
 
@@ -173,6 +177,11 @@ static void place_statics(carom_world *w)
     memcpy(w->sub.q0, w->q, bytes);
     memcpy(w->sub.q1, w->q, bytes);
     for (int k = 0; k < CRM_MAX_SOLVES; k++) memcpy(w->sub.solve[k].q, w->q, bytes);
+    for (int i = 0; i < CRM_MAX_INNER && w->inner[i].q0; i++) {
+        memcpy(w->inner[i].q0, w->q, bytes);
+        memcpy(w->inner[i].q1, w->q, bytes);
+        for (int k = 0; k < CRM_MAX_SOLVES; k++) memcpy(w->inner[i].solve[k].q, w->q, bytes);
+    }
     w->statics_placed = 1;
 }
 

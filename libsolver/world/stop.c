@@ -118,7 +118,7 @@ static void clear_slips(crm_substep *s)
 carom_status crm_locate_stop(carom_world *w)
 {
     crm_substep *s = &w->sub;
-    if (s->map != CRM_MAP_SMOOTH) return CAROM_OK;
+    if (s->map != CRM_MAP_SMOOTH && s->map != CRM_MAP_EXTRAPOLATED) return CAROM_OK;
     if (!mark_slips(w)) {
         clear_slips(s);
         return CAROM_OK;

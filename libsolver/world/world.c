@@ -23,12 +23,14 @@ static carom_status check_settings(const carom_world_settings *s)
                          s->inexact >= s->accept && s->length >= 0 && s->rest_speed >= 0;
     const int bounded = s->dt < HUGE_VAL && s->margin < 1 && s->penetration < 1 &&
                         s->length < HUGE_VAL && s->rest_speed < HUGE_VAL;
+    const int order = s->order >= 2 && s->order <= 2 * CRM_MAX_COLUMNS && s->order % 2 == 0;
     const int finite = isfinite(s->gravity[0]) && isfinite(s->gravity[1]);
     const int words = s->integrator >= CAROM_EULER && s->integrator <= CAROM_FIXED &&
                       s->combine_friction >= 0 && s->combine_friction <= CAROM_COMBINE_MAX &&
                       s->combine_restitution >= 0 && s->combine_restitution <= CAROM_COMBINE_MAX;
-    return positive && bounded && finite && words && s->max_substeps >= 1 ? CAROM_OK
-                                                                          : CAROM_E_ARGUMENT;
+    return positive && bounded && finite && words && s->max_substeps >= 1 && order
+               ? CAROM_OK
+               : CAROM_E_ARGUMENT;
 }
 
 carom_status carom_world_create(const carom_world_settings *settings,
@@ -78,6 +80,7 @@ void crm_free_sealed(carom_world *w)
     crm_rows_free(w);
     crm_islands_free(w);
     crm_substep_free(w, &w->sub);
+    for (int k = 0; k < CRM_MAX_INNER; k++) crm_substep_free(w, &w->inner[k]);
 }
 
 void carom_world_destroy(carom_world *world)

@@ -6,6 +6,7 @@
 #include <string.h>
 
 carom_integrator scene_integrator = CAROM_EULER;
+int scene_order = 2;
 
 static void must(carom_world *w, carom_status e)
 {
@@ -19,6 +20,7 @@ carom_world *scene_world(double g, double dt)
     s.gravity[1] = -g;
     s.dt = dt;
     s.integrator = (int)scene_integrator;
+    s.order = scene_order;
     assert_int_equal(carom_world_create(&s, NULL, &w), CAROM_OK);
     return w;
 }

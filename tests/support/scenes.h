@@ -6,6 +6,8 @@
 
 /* Of the worlds made from now on; Euler at the start. */
 extern carom_integrator scene_integrator;
+/* ... and their order; 2 at the start. */
+extern int scene_order;
 /* Gravity (0, -g), step dt. */
 carom_world *scene_world(double g, double dt);
 /* Static box 40 x 2 whose top is y = 0; index of the body. */

@@ -118,6 +118,13 @@ CAROM_API carom_status carom_contact_solve(carom_contact_solver *solver,
                                            const carom_contact_problem *problem, int use_guess,
                                            carom_contact_solution *x, carom_contact_stats *stats);
 
+/* The equations of the modes in x->mode and nothing else: closed contacts rest in J_n v + c_n = 0,
+ * whatever the sign of l_n, those that stick in J_t v + c_t = 0, those that slip have l_t = +-mu
+ * l_n. For those who know the modes or search where they change.  One factorization. */
+CAROM_API carom_status carom_contact_modes(carom_contact_solver *solver,
+                                           const carom_contact_problem *problem,
+                                           carom_contact_solution *x);
+
 /* Why the last solve ended in CAROM_E_INFEASIBLE (Farkas): yn >= 0 (n_contacts) and ye
  * (n_joint_rows) with W (J_n' yn + J_e' ye) = 0 and yn . (J_n u + c_n) + ye . (J_e u + c_e) < 0, so
  * that no impulses help.  CAROM_E_STATE after any other end. */

@@ -19,7 +19,7 @@ typedef enum carom_body_type {
 } carom_body_type;
 
 typedef enum carom_integrator {
-    CAROM_EULER,  /* the paper's step, corrected: docs/math/equations.md (1)-(7), (12), (14) */
+    CAROM_EULER,   /* the paper's step, corrected: docs/math/equations.md (1)-(7), (12), (14) */
     CAROM_LOCATED, /* second order, impacts are located: docs/step.md */
     CAROM_FIXED    /* the same without location: one sub-step per step, for piles and real time */
 } carom_integrator;
@@ -35,14 +35,15 @@ typedef enum carom_combine {
  * `--set` use these names (carom_world_settings_set). */
 #define CAROM_WORLD_SETTINGS(X)                                                                    \
     X(dt, double, 1.0 / 60, "s", "length of a step")                                               \
-    X(integrator, int, CAROM_LOCATED, "", "euler, located or fixed")                                        \
+    X(integrator, int, CAROM_LOCATED, "", "euler, located or fixed")                               \
+    X(order, int, 2, "1", "order of located where nothing begins or ends: 2, 4, 6 or 8")           \
     X(combine_friction, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")                \
     X(combine_restitution, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")             \
     X(length, double, 0, "m", "length scale L; 0: largest diameter of a dynamic body's shape")     \
     X(margin, double, 1e-6, "L", "gap below which a pair is in contact")                           \
     X(penetration, double, 1e-9, "L", "overlap below which a new contact needs no shorter step")   \
     X(rest_speed, double, 1e-3, "sqrt(g L)", "approach slower than this does not bounce")          \
-    X(max_substeps, int, 32, "1", "sub-steps of an island, at most; 128/bodies in large ones")    \
+    X(max_substeps, int, 32, "1", "sub-steps of an island, at most; 128/bodies in large ones")     \
     X(project_overlap, int, 1, "", "overlap of the initial scene: 1 projected away, 0 refused")    \
     X(accept, double, 1e-10, "1", "residual of a solved contact problem")                          \
     X(inexact, double, 1e-6, "1", "residual of a usable one")
@@ -136,10 +137,12 @@ typedef struct carom_joint_def {
     carom_joint_kind kind;
     int body_a;
     int body_b;
-    carom_vec2 anchor;   /* world point, of both bodies; of a distance or rope the point of A [m] */
-    carom_vec2 anchor_b; /* distance, rope: the point of B; of a distance apart from the other [m] */
-    carom_vec2 axis;     /* prismatic, wheel: direction of the line, of any length */
-    double lower; /* lower and upper limit of: the turn of B against A from now on [rad], revolute; */
+    carom_vec2 anchor; /* world point, of both bodies; of a distance or rope the point of A [m] */
+    carom_vec2
+        anchor_b;    /* distance, rope: the point of B; of a distance apart from the other [m] */
+    carom_vec2 axis; /* prismatic, wheel: direction of the line, of any length */
+    double
+        lower; /* lower and upper limit of: the turn of B against A from now on [rad], revolute; */
     double upper; /* its way along the axis [m], prismatic and wheel; the distance [m], rope */
     double restitution; /* at the limits [1], 0 to 1 */
     int collide;        /* 1: the two bodies may touch each other */
@@ -172,12 +175,13 @@ typedef struct carom_step_stats {
     double residual;    /* largest of the step's contact problems [1] */
     double penetration; /* largest overlap at the end [m], >= 0 */
     double joint_drift; /* largest position error of a joint at the end [m] */
+    double estimate;    /* of the error of position in this step, order > 2 [m]; else 0 */
     double energy;      /* kinetic + gravitational at the end [J] */
     int n_islands;      /* groups of bodies that advanced alone */
     int n_candidates;   /* pairs that may touch within the step */
     int n_contacts;     /* contact points of the islands' last sub-steps */
     int n_substeps;     /* of the busiest island */
-    int n_events; /* impacts: sub-steps in which restitution acted or a step was shortened */
+    int n_events;       /* impacts: sub-steps in which restitution acted or a step was shortened */
     int factorizations;
     int iterations;
     int degenerate;            /* weakly active or stick/slip borderline contacts */
