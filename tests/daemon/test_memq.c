@@ -78,6 +78,29 @@ static void session(void **state)
     stop(s);
 }
 
+/* What a program sees that does not look at what carom_client_create returned. */
+static void no_client(void **state)
+{
+    (void)state;
+    assert_int_equal(carom_client_connect(NULL, NULL, NULL), CAROM_CLIENT_E_MEMORY);
+    assert_int_equal(carom_client_attach(NULL, NULL, NULL), CAROM_CLIENT_E_MEMORY);
+    assert_non_null(strstr(carom_client_error(NULL), "no memory"));
+    carom_client_destroy(NULL);
+}
+
+/* A world without bodies has states, too. */
+static void empty_scene(void **state)
+{
+    (void)state;
+    setup s = start("");
+    const carom_client_scene nothing = {0};
+    const carom_client_run run = {0};
+    assert_int_equal(carom_client_open(s.client, &nothing), CAROM_CLIENT_OK);
+    assert_int_equal(carom_client_step(s.client, &run), CAROM_CLIENT_OK);
+    assert_int_equal(carom_client_get_state(s.client)->n_bodies, 0);
+    stop(s);
+}
+
 static void scene_file(void **state)
 {
     (void)state;
@@ -227,6 +250,8 @@ int main(void)
         cmocka_unit_test(trajectory),
         cmocka_unit_test(gradient),
         cmocka_unit_test(session),
+        cmocka_unit_test(no_client),
+        cmocka_unit_test(empty_scene),
         cmocka_unit_test(scene_file),
         cmocka_unit_test(large_scene),
         cmocka_unit_test(lost_messages_change_nothing),

@@ -32,7 +32,7 @@ carom_client *carom_client_create(void)
 
 const char *carom_client_error(const carom_client *c)
 {
-    return c->error;
+    return c ? c->error : "no memory for a client";
 }
 
 carom_client_info carom_client_last(const carom_client *c)
@@ -130,6 +130,7 @@ static carom_client_code subscribe(carom_client *c, const char *daemon)
 
 carom_client_code carom_client_connect(carom_client *c, const char *url, const char *daemon)
 {
+    if (!c) return CAROM_CLIENT_E_MEMORY;
     if (c->lcm) return crm_client_fail(c, CAROM_CLIENT_E_ARGUMENT, "already connected");
     snprintf(c->where, sizeof c->where, "%s", url ? url : CAROM_CLIENT_URL);
     if (strncmp(c->where, "tcpq://", 7) == 0 && !listens(c->where)) {
@@ -148,6 +149,7 @@ carom_client_code carom_client_connect(carom_client *c, const char *url, const c
 
 carom_client_code carom_client_attach(carom_client *c, void *lcm, const char *daemon)
 {
+    if (!c) return CAROM_CLIENT_E_MEMORY;
     if (c->lcm) return crm_client_fail(c, CAROM_CLIENT_E_ARGUMENT, "already connected");
     snprintf(c->where, sizeof c->where, "the given LCM network");
     c->lcm = lcm;

@@ -50,7 +50,7 @@ static carom_contact_info contact_of(const carom_state_t *m, int k)
 static int reserve_state(carom_client *c, const carom_state_t *m)
 {
     const int n = m->num_contacts;
-    const int n_numbers = 2 * m->num_q;
+    const int n_numbers = 2 * m->num_q + 1; /* never none */
     if (n > c->n_contacts_max) {
         carom_contact_info *more = realloc(c->contacts, (size_t)n * sizeof *more);
         if (!more) return 0;

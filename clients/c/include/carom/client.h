@@ -32,7 +32,7 @@ typedef enum carom_client_code {
 
 typedef struct carom_client carom_client;
 
-/* NULL: no memory. */
+/* NULL: no memory; carom_client_connect and carom_client_error then say so. */
 CAROM_API carom_client *carom_client_create(void);
 /* Closes the session, when there is one and the server still answers. */
 CAROM_API void carom_client_destroy(carom_client *client);
