@@ -229,11 +229,33 @@ static void named_cases_swapped(void **state)
     }
 }
 
+/* A segment of 5 m, 1e40 m away in its body's frame: turned, its ends are one place within
+ * rounding.  The distance is still right to the rounding of the coordinates, either way around. */
+static void edge_lost_in_rounding(void **state)
+{
+    (void)state;
+    const carom_vec2 v[2] = {{-1e40, 5}, {-1e40, 0}};
+    const carom_shape segment = {8, 2, v};
+    const carom_shape disc = DISC(1e39);
+    for (int k = 0; k < 100; k++) {
+        const carom_pose q = {0.1 * k, 1, -2};
+        const carom_pose o = {0, 0, 0};
+        const carom_manifold m[2] = {carom_collide(&disc, o, &segment, q, HUGE_VAL),
+                                     carom_collide(&segment, q, &disc, o, HUGE_VAL)};
+        for (int i = 0; i < 2; i++) {
+            assert_true(m[i].count > 0);
+            assert_near_case("distance", k, m[i].distance, 9e39, 1e26);
+            assert_near_case("normal", k, hypot(m[i].normal.x, m[i].normal.y), 1, 1e-12);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(named_cases),
         cmocka_unit_test(named_cases_swapped),
+        cmocka_unit_test(edge_lost_in_rounding),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

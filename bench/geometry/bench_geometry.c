@@ -1,7 +1,8 @@
 /* Nanoseconds per pair of polygons, carom and its peers on the same pairs in the same run.
  *
- * Each figure is the median over rounds of the mean over N_PAIRS pairs.  The answers of carom are
- * checked: with and without a cache they must be the same bits. */
+ * Each figure is the median over rounds of the mean over N_PAIRS pairs; in a round each contender
+ * has its turn, so that a busy machine is as slow for all.  The answers of carom are checked: with
+ * and without a cache they must be the same bits. */
 #include "pairs.h"
 
 #include <math.h>
@@ -10,7 +11,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { N_ROUNDS = 31, MAX_CONTENDERS = 5 };
+enum { N_ROUNDS = 101, MAX_CONTENDERS = 5 };
 
 static double now_ns(void)
 {
@@ -88,22 +89,61 @@ static int compare(const void *x, const void *y)
     return (a > b) - (a < b);
 }
 
-/* Median nanoseconds per pair; *points: what it finds, *sum: a digest of it. */
-static double measure(const contender *c, const pairs *p, int *points, double *sum)
+typedef struct result {
+    double ns; /* median per pair */
+    int points;
+    double digest; /* of what was found */
+} result;
+
+/* All contenders on the same pairs, by turns. */
+static void measure(int n, const contender *const *all, const pairs *p, result *out)
 {
-    double t[N_ROUNDS];
-    void *self = c->create(p);
-    *sum = 0;
-    *points = c->run(self, sum);
-    for (int r = 0; r < N_ROUNDS; r++) {
-        double ignored = 0;
-        const double start = now_ns();
-        if (c->run(self, &ignored) != *points) abort();
-        t[r] = (now_ns() - start) / N_PAIRS;
+    double t[MAX_CONTENDERS][N_ROUNDS];
+    void *self[MAX_CONTENDERS];
+    for (int c = 0; c < n; c++) {
+        self[c] = all[c]->create(p);
+        out[c].digest = 0;
+        out[c].points = all[c]->run(self[c], &out[c].digest);
     }
-    c->destroy(self);
-    qsort(t, N_ROUNDS, sizeof *t, compare);
-    return t[N_ROUNDS / 2];
+    for (int r = 0; r < N_ROUNDS; r++) {
+        for (int c = 0; c < n; c++) {
+            double ignored = 0;
+            const double start = now_ns();
+            if (all[c]->run(self[c], &ignored) != out[c].points) abort();
+            t[c][r] = (now_ns() - start) / N_PAIRS;
+        }
+    }
+    for (int c = 0; c < n; c++) {
+        all[c]->destroy(self[c]);
+        qsort(t[c], N_ROUNDS, sizeof *t[c], compare);
+        out[c].ns = t[c][N_ROUNDS / 2];
+    }
+}
+
+static void print(int n, const contender *const *all, const pairs *p, situation s,
+                  const result *results, FILE *csv)
+{
+    printf("%2d vertices, %-13s", p->n, situation_name(s));
+    for (int c = 0; c < n; c++) {
+        printf("  %s %.1f ns", all[c]->name, results[c].ns);
+        if (!csv) continue;
+        fprintf(csv, "%d,%s,%s,%.2f,%d\n", p->n, situation_name(s), all[c]->name, results[c].ns,
+                results[c].points);
+    }
+    printf("\n");
+}
+
+static int run_all(int n, const contender *const *all, const pairs *p, situation s, FILE *csv)
+{
+    const contender *able[MAX_CONTENDERS];
+    result results[MAX_CONTENDERS];
+    int n_able = 0;
+    for (int c = 0; c < n; c++) {
+        if (p->n <= all[c]->max_vertices) able[n_able++] = all[c];
+    }
+    measure(n_able, able, p, results);
+    print(n_able, able, p, s, results, csv);
+    return results[0].digest == results[1].digest && results[1].digest == results[2].digest;
 }
 
 int main(int argc, char **argv)
@@ -122,24 +162,10 @@ int main(int argc, char **argv)
     if (csv) fprintf(csv, "vertices,situation,who,ns,points\n");
     for (int k = 0; k < 4; k++) {
         for (int s = 0; s < N_SITUATIONS; s++) {
-            double digest[MAX_CONTENDERS] = {0};
             make_pairs(counts[k], (situation)s, &p);
-            printf("%2d vertices, %-13s", counts[k], situation_name((situation)s));
-            for (int c = 0; c < n_all; c++) {
-                int points;
-                if (counts[k] > all[c]->max_vertices) continue;
-                const double ns = measure(all[c], &p, &points, &digest[c]);
-                printf("  %s %.1f ns", all[c]->name, ns);
-                if (csv) {
-                    fprintf(csv, "%d,%s,%s,%.2f,%d\n", counts[k], situation_name((situation)s),
-                            all[c]->name, ns, points);
-                }
-            }
-            printf("\n");
-            if (digest[0] != digest[1] || digest[1] != digest[2]) {
-                fprintf(stderr, "the cache changed an answer\n");
-                return 1;
-            }
+            if (run_all(n_all, all, &p, (situation)s, csv)) continue;
+            fprintf(stderr, "the cache changed an answer\n");
+            return 1;
         }
     }
     if (csv) fclose(csv);

@@ -12,9 +12,12 @@
 
 enum { MAX_QUADS = CRM_FEW / 4 };
 
+/* Vertices, and outward normals of the edges from them, as long as these. */
 typedef struct few {
     crm_quad x[MAX_QUADS];
     crm_quad y[MAX_QUADS];
+    crm_quad ux[MAX_QUADS];
+    crm_quad uy[MAX_QUADS];
 } few;
 
 static inline crm_lanes vertex(const crm_placed *p, int i)
@@ -22,6 +25,7 @@ static inline crm_lanes vertex(const crm_placed *p, int i)
     return crm_lanes_load(&p->v[i < p->n ? i : 0].x);
 }
 
+/* In p's frame: the differences are taken before anything is turned, as in crm_edge. */
 static inline void gather(const crm_placed *p, int quads, few *f)
 {
     for (int i = 0; i < quads; i++) {
@@ -32,6 +36,19 @@ static inline void gather(const crm_placed *p, int quads, few *f)
         f->x[i] = crm_quad_join(crm_lanes_firsts(v0, v1), crm_lanes_firsts(v2, v3));
         f->y[i] = crm_quad_join(crm_lanes_seconds(v0, v1), crm_lanes_seconds(v2, v3));
     }
+    for (int i = 0; i < quads; i++) {
+        const int next = i + 1 < quads ? i + 1 : 0;
+        f->ux[i] = crm_quad_sub(crm_quad_shift(f->y[i], f->y[next]), f->y[i]);
+        f->uy[i] = crm_quad_sub(f->x[i], crm_quad_shift(f->x[i], f->x[next]));
+    }
+}
+
+static inline void rotate(crm_quad c, crm_quad s, crm_quad *x, crm_quad *y)
+{
+    const crm_quad u = *x;
+    const crm_quad v = *y;
+    *x = crm_quad_sub(crm_quad_mul(c, u), crm_quad_mul(s, v));
+    *y = crm_quad_add(crm_quad_mul(s, u), crm_quad_mul(c, v));
 }
 
 /* From b's frame into a's, still from b's position. */
@@ -40,10 +57,8 @@ static inline void turn(const crm_placed *a, const crm_placed *b, int quads, few
     const crm_quad c = crm_quad_all(a->cos * b->cos + a->sin * b->sin);
     const crm_quad s = crm_quad_all(a->cos * b->sin - a->sin * b->cos);
     for (int i = 0; i < quads; i++) {
-        const crm_quad x = f->x[i];
-        const crm_quad y = f->y[i];
-        f->x[i] = crm_quad_sub(crm_quad_mul(c, x), crm_quad_mul(s, y));
-        f->y[i] = crm_quad_add(crm_quad_mul(s, x), crm_quad_mul(c, y));
+        rotate(c, s, &f->x[i], &f->y[i]);
+        rotate(c, s, &f->ux[i], &f->uy[i]);
     }
 }
 
@@ -129,9 +144,8 @@ static inline top higher_of(top t, top u)
 static inline crm_quad see_four(int quads, int i, const few *p, const few *q, carom_vec2 d,
                                 faces *f)
 {
-    const int next = i + 1 < quads ? i + 1 : 0;
-    const crm_quad ux = crm_quad_sub(crm_quad_shift(p->y[i], p->y[next]), p->y[i]);
-    const crm_quad uy = crm_quad_sub(p->x[i], crm_quad_shift(p->x[i], p->x[next]));
+    const crm_quad ux = p->ux[i];
+    const crm_quad uy = p->uy[i];
     crm_quad low = low_of_four(ux, uy, q->x[0], q->y[0], &f->lowest[i][0]);
     if (quads == 2) {
         f->low[i][0] = low;
