@@ -20,7 +20,7 @@ layer() {
     libgeom/*) layer=geom ;;
     libsolver/lcp/* | libsolver/include/carom/lcp.h) layer=lcp ;;
     libsolver/contact/* | libsolver/include/carom/contact.h) layer=contact ;;
-    libsolver/world/* | libsolver/include/carom/world.h | libsolver/include/carom/world_query.h | libsolver/include/carom/snapshot.h) layer=world ;;
+    libsolver/world/* | libsolver/include/carom/world.h | libsolver/include/carom/world_query.h | libsolver/include/carom/snapshot.h | libsolver/include/carom/events.h) layer=world ;;
     libsolver/grad/* | libsolver/include/carom/grad.h) layer=grad ;;
     libsolver/include/carom/carom.h) layer=all ;;
     proto/*) layer=proto ;;

@@ -5,6 +5,7 @@
 #include "base/memory.h"
 #include "carom/broadphase.h"
 #include "carom/collide.h"
+#include "carom/events.h"
 #include "carom/world.h"
 
 #include <math.h>
@@ -228,6 +229,13 @@ typedef struct crm_islands {
     size_t bytes;
 } crm_islands;
 
+/* Events of the last step; those of the step under way while there is one. */
+typedef struct crm_events {
+    int on;
+    int n, max;
+    carom_contact_event *list;
+} crm_events;
+
 /* Told of every accepted sub-step, and when those of a frame are void. */
 typedef struct crm_recorder {
     carom_status (*substep)(void *user, const crm_substep *s);
@@ -292,6 +300,7 @@ struct carom_world {
     long n_steps;
     carom_step_stats *stats; /* of the step under way */
     crm_recorder recorder;
+    crm_events events;
 };
 
 /* world.c: sets world->error and returns status. */
@@ -535,6 +544,15 @@ carom_status crm_stop_passing(carom_world *w, double left);
 /* Runs S on (0, left]; when a contact outside sub.contacts closes on the way, ends at the
  * first such event; when more than `allowed` do, *busy = 1 and nothing counts. */
 carom_status crm_locate(carom_world *w, double left, int allowed, int *busy);
+
+/* events.c */
+void crm_events_free(carom_world *w);
+/* Impacts of the sub-step just committed, which began so long after the step did. */
+carom_status crm_events_note(carom_world *w, double time);
+/* Room for all that crm_events_compare could find. */
+carom_status crm_events_reserve(carom_world *w);
+/* What the touches have that the n_before of the last step had not, and the other way round. */
+void crm_events_compare(carom_world *w, int n_before);
 
 /* seal.c */
 carom_status crm_seal(carom_world *w);

@@ -113,13 +113,15 @@ static carom_status substep(carom_world *w, double *left)
 {
     const int allowed = substeps_allowed(w) - w->n_substeps - 1;
     int busy = allowed <= 0;
+    const double since = fmax(w->settings.dt - *left, 0);
     begin_substep(w);
     carom_status e = busy ? CAROM_OK : run_located(w, *left, allowed, &busy);
     if (e >= 0 && busy) e = run_last(w, *left);
     if (e < 0) return e;
     if (e > w->stats->status) w->stats->status = e;
     *left = w->sub.end == CRM_END_FRAME ? 0 : *left - w->sub.h;
-    return commit(w);
+    e = commit(w);
+    return !e && w->events.on ? crm_events_note(w, since) : e;
 }
 
 static void finish_island(carom_world *w, double left)
@@ -162,6 +164,7 @@ static carom_status advance_island(carom_world *w, const crm_island *island)
 static carom_status advance_islands(carom_world *w)
 {
     w->next.n = 0;
+    w->events.n = 0;
     for (int k = 0; k < w->islands.n; k++) {
         const carom_status e = advance_island(w, &w->islands.list[k]);
         if (e < 0) return e;
@@ -255,13 +258,20 @@ static carom_status step(carom_world *w, const double *force)
     place_statics(w);
     save_state(w);
     e = advance(w);
+    if (e >= 0 && w->events.on) {
+        const carom_status full = crm_events_reserve(w);
+        if (full) e = full;
+    }
     if (e < 0) {
         restore_state(w);
         crm_forget_guesses(w);
+        w->events.n = 0;
         return crm_world_fail(w, e, "step %ld, sub-step %d: %s", w->n_steps + 1, w->n_substeps + 1,
                               carom_status_text(e));
     }
+    const int n_before = w->touches.n;
     crm_touches_turn(w);
+    if (w->events.on) crm_events_compare(w, n_before);
     w->n_steps++;
     finish_stats(w);
     return w->stats->status;

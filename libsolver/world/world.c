@@ -93,6 +93,7 @@ void carom_world_destroy(carom_world *world)
     crm_free(&world->memory, world->touches.list, (size_t)world->touches.max,
              sizeof *world->touches.list);
     crm_free(&world->memory, world->next.list, (size_t)world->next.max, sizeof *world->next.list);
+    crm_events_free(world);
     crm_memory m = world->memory;
     crm_free(&m, world, 1, sizeof *world);
 }

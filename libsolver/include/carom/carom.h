@@ -6,6 +6,7 @@
 #include "carom/chain.h"
 #include "carom/collide.h"
 #include "carom/contact.h"
+#include "carom/events.h"
 #include "carom/grad.h"
 #include "carom/query.h"
 #include "carom/shape.h"
