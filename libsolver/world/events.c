@@ -61,21 +61,21 @@ static int hits(const carom_world *w, const crm_contact *c, double approach)
 carom_status crm_events_note(carom_world *w, double time)
 {
     const crm_substep *s = &w->sub;
-    const crm_touch *t = w->next.list + w->first_touch;
     const carom_status e = reserve(w, s->n_contacts);
     if (e) return e;
     for (int k = 0; k < s->n_contacts; k++) {
         double jn[6];
         double jt[6];
         const crm_contact *c = &s->contacts[k];
-        if (c->limit || !(t[k].ln > 0)) continue;
+        const crm_touch *t = &w->next.list[w->first_touch + k];
+        if (c->limit || !(t->ln > 0)) continue;
         crm_contact_rows(c, jn, jt);
         const double approach = -crm_row_dot(jn, s->v0, c->body_a, c->body_b);
         if (s->map != CRM_MAP_IMPACT && !hits(w, c, approach)) continue;
-        carom_contact_event *event = put(w, CAROM_CONTACT_IMPACT, &t[k], time);
+        carom_contact_event *event = put(w, CAROM_CONTACT_IMPACT, t, time);
         event->approach = approach;
-        event->ln = t[k].ln;
-        event->lt = t[k].lt;
+        event->ln = t->ln;
+        event->lt = t->lt;
     }
     return CAROM_OK;
 }
