@@ -11,15 +11,6 @@ static const double GRAZING = 1e-9;
  * numbers that have lost their normal form make every product slow. */
 static const double NEGLIGIBLE = 1e-200;
 
-static int most_contacts(const carom_tape *t)
-{
-    int n = 0;
-    for (int k = 0; k < t->n_records; k++) {
-        if (t->records[k].s.n_contacts > n) n = t->records[k].s.n_contacts;
-    }
-    return n;
-}
-
 static void lay_unpacked(crm_unpacked *u, crm_block *b, size_t n3)
 {
     double **const states[] = {&u->q0, &u->v0, &u->q1, &u->v1};
@@ -61,7 +52,7 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
 
 static carom_status allocate(crm_reverse *r)
 {
-    const int m = most_contacts(r->tape);
+    const int m = r->tape->most_contacts;
     const carom_status e = crm_rows_reserve(r->world, m);
     if (e) return e;
     crm_block b = {NULL, 0};
@@ -268,7 +259,8 @@ static carom_status reverse_frame(crm_reverse *r, int frame)
 {
     const carom_tape *t = r->tape;
     const int first = t->frames[frame].first_record;
-    const int end = frame + 1 < t->n_frames ? t->frames[frame + 1].first_record : t->n_records;
+    const int more = frame + 1 < t->n_frames && crm_segment(t, frame + 1) == t->held;
+    const int end = more ? t->frames[frame + 1].first_record : t->n_records;
     const int before = r->stats.degenerate;
     double *steps = r->sink.g.force_steps;
     r->sink.force_step = steps ? steps + 3 * (size_t)r->world->n_bodies * (size_t)frame : NULL;
@@ -316,7 +308,8 @@ static carom_status reverse_all(crm_reverse *r, int n_bars, const carom_state_ba
     r->stats.first_degenerate_step = -1;
     for (int frame = r->tape->n_frames - 1; frame >= 0; frame--) {
         add_bars(r, frame + 1, n_bars, bars);
-        const carom_status e = reverse_frame(r, frame);
+        carom_status e = crm_hold_segment(r->tape, frame);
+        if (e >= 0) e = reverse_frame(r, frame);
         if (e < 0) return e;
     }
     add_bars(r, 0, n_bars, bars);

@@ -22,6 +22,12 @@ typedef struct crm_frame {
     double *q, *v;    /* 3 n_bodies: state before this step */
 } crm_frame;
 
+/* A world as bytes. */
+typedef struct crm_snapshot {
+    void *bytes;
+    size_t size, capacity;
+} crm_snapshot;
+
 struct carom_tape {
     crm_memory memory;
     carom_world *world;
@@ -32,7 +38,30 @@ struct carom_tape {
     crm_frame *frames;
     double *q_end, *v_end; /* 3 n_bodies: state after the last recorded step */
     int n_bodies;
+    int most_contacts;   /* of all sub-steps recorded */
+    int frame;           /* under way */
+    carom_world *source; /* of the sub-steps under way: world, or replay */
+    /* Checkpoints: only one segment of `every` frames has records; the others are run again. */
+    int every; /* 0: all frames are one segment */
+    int held;  /* the segment that has them, from its start; -1: none */
+    int max_snapshots;
+    crm_snapshot *snapshots; /* per segment: of the world before it */
+    carom_world *replay;     /* during a gradient: a copy of the world that runs again */
 };
+
+/* tape.c */
+/* Records the step `frame` of t->source, whose force is in the frame. */
+carom_status crm_record_step(carom_tape *t, int frame, const double *force,
+                             carom_step_stats *stats);
+void crm_drop_records(carom_tape *t, int n);
+
+/* checkpoint.c */
+int crm_segment(const carom_tape *t, int frame);
+/* Before frame is run: a snapshot when a segment begins. */
+carom_status crm_checkpoint(carom_tape *t, int frame);
+/* The records of the segment of frame, run again when they are gone. */
+carom_status crm_hold_segment(carom_tape *t, int frame);
+void crm_free_checkpoints(carom_tape *t);
 
 /* Cotangents of the parameters; NULL where not wanted. */
 typedef struct crm_sink {

@@ -69,7 +69,7 @@ static void pack(const crm_island *i, const crm_substep *s, crm_block *b, crm_re
 static carom_status record_substep(void *user, const crm_substep *s)
 {
     carom_tape *t = user;
-    const crm_island *island = t->world->island;
+    const crm_island *island = t->source->island;
     void *records = t->records;
     carom_status e =
         crm_reserve(&t->memory, &records, &t->max_records, t->n_records + 1, sizeof *t->records);
@@ -84,14 +84,15 @@ static carom_status record_substep(void *user, const crm_substep *s)
     b.base = r->block;
     b.used = 0;
     pack(island, s, &b, r);
-    r->s.force = t->frames[t->n_frames].force;
-    r->which = (int)(island - t->world->islands.list);
+    r->s.force = t->frames[t->frame].force;
+    r->which = (int)(island - t->source->islands.list);
+    if (s->n_contacts > t->most_contacts) t->most_contacts = s->n_contacts;
     t->n_records++;
     return CAROM_OK;
 }
 
 /* Drops records down to n. */
-static void drop_records(carom_tape *t, int n)
+void crm_drop_records(carom_tape *t, int n)
 {
     while (t->n_records > n) {
         crm_record *r = &t->records[--t->n_records];
@@ -103,7 +104,7 @@ static void drop_records(carom_tape *t, int n)
 static void restart_frame(void *user)
 {
     carom_tape *t = user;
-    drop_records(t, t->frames[t->n_frames].first_record);
+    crm_drop_records(t, t->frames[t->frame].first_record);
 }
 
 static void keep_end(carom_tape *t)
@@ -125,6 +126,7 @@ carom_status carom_tape_create(carom_world *world, const carom_allocator *alloca
     if (!t) return CAROM_E_MEMORY;
     t->memory = memory;
     t->world = world;
+    t->source = world;
     t->n_bodies = world->n_bodies;
     t->q_end = crm_new(&t->memory, n3(t), sizeof(double));
     t->v_end = crm_new(&t->memory, n3(t), sizeof(double));
@@ -140,7 +142,7 @@ carom_status carom_tape_create(carom_world *world, const carom_allocator *alloca
 void carom_tape_destroy(carom_tape *tape)
 {
     if (!tape) return;
-    drop_records(tape, 0);
+    crm_drop_records(tape, 0);
     for (int k = 0; k < tape->max_frames; k++) {
         crm_free(&tape->memory, tape->frames[k].force, 3 * n3(tape), sizeof(double));
     }
@@ -148,14 +150,16 @@ void carom_tape_destroy(carom_tape *tape)
     crm_free(&tape->memory, tape->frames, (size_t)tape->max_frames, sizeof *tape->frames);
     crm_free(&tape->memory, tape->q_end, n3(tape), sizeof(double));
     crm_free(&tape->memory, tape->v_end, n3(tape), sizeof(double));
+    crm_free_checkpoints(tape);
     crm_memory m = tape->memory;
     crm_free(&m, tape, 1, sizeof *tape);
 }
 
 void carom_tape_rewind(carom_tape *tape)
 {
-    drop_records(tape, 0);
+    crm_drop_records(tape, 0);
     tape->n_frames = 0;
+    tape->held = -1;
     tape->revision = tape->world->revision;
     crm_forget_clocks(tape->world);
     keep_end(tape);
@@ -177,7 +181,6 @@ static carom_status open_frame(carom_tape *t, const double *force)
     f->v = f->q + n3(t);
     memcpy(f->q, w->q, n3(t) * sizeof(double));
     memcpy(f->v, w->v, n3(t) * sizeof(double));
-    f->first_record = t->n_records;
     for (size_t k = 0; k < n3(t); k++) f->force[k] = w->force[k] + (force ? force[k] : 0);
     return CAROM_OK;
 }
@@ -189,6 +192,19 @@ static int continues(const carom_tape *t)
            !memcmp(t->v_end, t->world->v, bytes);
 }
 
+carom_status crm_record_step(carom_tape *t, int frame, const double *force, carom_step_stats *stats)
+{
+    carom_world *w = t->source;
+    const crm_recorder recorder = {record_substep, restart_frame, t};
+    t->frame = frame;
+    t->frames[frame].first_record = t->n_records;
+    w->recorder = recorder;
+    const carom_status e = carom_world_step(w, force, stats);
+    memset(&w->recorder, 0, sizeof w->recorder);
+    if (e < 0) crm_drop_records(t, t->frames[frame].first_record);
+    return e;
+}
+
 carom_status carom_tape_step(carom_tape *tape, const double *force, carom_step_stats *stats)
 {
     if (!tape) return CAROM_E_ARGUMENT;
@@ -198,16 +214,10 @@ carom_status carom_tape_step(carom_tape *tape, const double *force, carom_step_s
                               "the world changed since the last recorded step; rewind the tape");
     }
     carom_status e = open_frame(tape, force);
+    if (!e) e = crm_checkpoint(tape, tape->n_frames);
     if (e) return crm_world_fail(w, e, "no memory to record step %ld", w->n_steps + 1);
-    const int first = tape->n_records;
-    const crm_recorder recorder = {record_substep, restart_frame, tape};
-    w->recorder = recorder;
-    e = carom_world_step(w, force, stats);
-    memset(&w->recorder, 0, sizeof w->recorder);
-    if (e < 0) {
-        drop_records(tape, first);
-        return e;
-    }
+    e = crm_record_step(tape, tape->n_frames, force, stats);
+    if (e < 0) return e;
     tape->n_frames++;
     keep_end(tape);
     return e;

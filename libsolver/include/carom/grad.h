@@ -18,6 +18,11 @@ CAROM_API void carom_tape_destroy(carom_tape *tape);
 /* carom_world_step, recorded.  A failed step is not recorded. */
 CAROM_API carom_status carom_tape_step(carom_tape *tape, const double *force,
                                        carom_step_stats *stats);
+/* For long runs: keeps, of every `every` steps, a snapshot of the world and the states, and the
+ * sub-steps of the last `every` only; carom_tape_gradient runs the others again, on a copy of the
+ * world, and gets the same bits.  Memory is least near every = sqrt(steps).  0: keeps all, as a new
+ * tape does.  Before the first step of a recording, else CAROM_E_STATE. */
+CAROM_API carom_status carom_tape_checkpoint(carom_tape *tape, int every);
 /* Forgets all steps; the next recording starts at the world's present state. */
 CAROM_API void carom_tape_rewind(carom_tape *tape);
 CAROM_API int carom_tape_steps(const carom_tape *tape);
