@@ -611,25 +611,43 @@ static void slide_then_roll(void **state)
     scene_integrator = CAROM_EULER;
 }
 
+/* A disc slides without friction; a little of it would slow it: x(T) = v T - mu g T^2 / 2, from the
+ * right at mu = 0. */
+static void first_of_friction(void **state)
+{
+    (void)state;
+    static const carom_integrator maps[2] = {CAROM_LOCATED, CAROM_FIXED};
+    for (int k = 0; k < 2; k++) {
+        scene_integrator = maps[k];
+        carom_world *w = scene_world(9.81, 1.0 / 50);
+        scene_floor(w, 0, 0);
+        const int b = scene_disc(w, 3, 0.5, 0, 0.5, 0, 0);
+        scene_push(w, b, 0, -2, 0);
+        whole x = gradient_of_final(w, 50, 3 * b + 1);
+        assert_near(x.g.friction[0] + x.g.friction[b], 0.5 * 9.81, 1e-10);
+        free_gradient(&x);
+        carom_world_destroy(w);
+    }
+    scene_integrator = CAROM_EULER;
+}
+
 int main(void)
 {
     static const CMUnitTestFunction maps[4] = {against_differences, located_against_differences,
                                                sixth_order_against_differences,
                                                fixed_against_differences};
-    struct CMUnitTest tests[4 * N_SCENES + 7];
+    struct CMUnitTest tests[4 * N_SCENES + 8];
     memset(tests, 0, sizeof tests);
     for (int k = 0; k < 4 * N_SCENES; k++) {
         tests[k].name = SCENES[k % N_SCENES].name;
         tests[k].test_func = maps[k / N_SCENES];
         tests[k].initial_state = (void *)(size_t)&SCENES[k % N_SCENES];
     }
-    const struct CMUnitTest closed[7] = {cmocka_unit_test(stopping_distance),
-                                         cmocka_unit_test(slide_then_roll),
-                                         cmocka_unit_test(sliding_friction_sign),
-                                         cmocka_unit_test(wall_bounce),
-                                         cmocka_unit_test(bounce_on_a_border),
-                                         cmocka_unit_test(head_on),
-                                         cmocka_unit_test(free_flight)};
+    const struct CMUnitTest closed[8] = {
+        cmocka_unit_test(first_of_friction), cmocka_unit_test(stopping_distance),
+        cmocka_unit_test(slide_then_roll),   cmocka_unit_test(sliding_friction_sign),
+        cmocka_unit_test(wall_bounce),       cmocka_unit_test(bounce_on_a_border),
+        cmocka_unit_test(head_on),           cmocka_unit_test(free_flight)};
     memcpy(tests + 4 * N_SCENES, closed, sizeof closed);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -117,6 +117,38 @@ static void add_friction(crm_reverse *r, const crm_contact *c, double mu_bar)
     g[c->body_b] += mu_bar * crm_combine_slope(rule, b, a);
 }
 
+/* A closed contact without friction has no tangential row, but a right-sided derivative: friction
+ * would oppose its slip, mu_bar = -sign(u_t) l_n J_t W p with p = u_bar.  0 where it does not slip.
+ */
+static double first_friction(const crm_reverse *r, const crm_solve *c, int k, const crm_contact *x)
+{
+    const crm_rows *rows = &r->world->rows;
+    const double *jt = &rows->jt[6 * k];
+    const double u = crm_row_dot(jt, c->v, x->body_a, x->body_b);
+    double sum = 0;
+    if (c->mode[k] == CAROM_SEPARATED || u == 0) return 0;
+    for (int i = 0; i < 6; i++) {
+        const int body = rows->contact_body[2 * k + i / 3];
+        if (body >= 0)
+            sum += jt[i] * rows->inv_mass[3 * body + i % 3] * r->bars.u[3 * body + i % 3];
+    }
+    return (u > 0 ? -1 : 1) * c->ln[k] * sum;
+}
+
+static void friction_vjp(crm_reverse *r, const crm_solve *c, int k, const crm_contact *x)
+{
+    const carom_world *w = r->world;
+    if (!r->sink.g.friction || x->limit) return;
+    const double mu =
+        crm_combine(w->settings.combine_friction, w->friction[x->body_a], w->friction[x->body_b]);
+    const int projects = c->kind == CRM_HOLD || c->kind == CRM_HOLD_SPEED;
+    if (mu > 0 || projects) {
+        add_friction(r, x, r->bars.mu[k]);
+    } else {
+        add_friction(r, x, first_friction(r, c, k, x));
+    }
+}
+
 void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, const double *gap_bar,
                   const double *error_bar, double *q_bar, int with_parameters)
 {
@@ -126,8 +158,7 @@ void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, cons
         const double *jt_bar = rough ? &r->bars.jt[6 * k] : NULL;
         crm_contact_rows_vjp(&s->moved[k], &r->bars.jn[6 * k], jt_bar, &bar);
         crm_geometry_vjp(r, c->q, &s->moved[k], &bar, q_bar, with_parameters);
-        if (with_parameters && rough && !s->moved[k].limit)
-            add_friction(r, &s->moved[k], r->bars.mu[k]);
+        if (with_parameters && rough) friction_vjp(r, c, k, &s->moved[k]);
     }
     int row = 0;
     for (int k = 0; k < r->world->island->n_joints; k++) {

@@ -247,5 +247,8 @@ void crm_touches_turn(carom_world *w)
 carom_status crm_map_run(carom_world *w, double h)
 {
     if (!w->smooth) return crm_euler(w, h);
-    return w->settings.order > 2 && !w->sub.ahead ? crm_extrapolate(w, h) : crm_smooth(w, h);
+    /* Free flight is exact as it is. */
+    const int bound = w->sub.n_contacts > 0 || w->island->n_rows > 0;
+    return w->settings.order > 2 && bound && !w->sub.ahead ? crm_extrapolate(w, h)
+                                                           : crm_smooth(w, h);
 }
