@@ -189,6 +189,14 @@ static const fault FAULTS[] = {
     {"slack for ever",
      JOINT("\"type\":\"rope\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0],\"anchor_b\":[1,0]"),
      "joints[0].upper: must be given"},
+    {"target without pull", JOINT("\"type\":\"target\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0]"),
+     "joints[0].stiffness: must be given"},
+    {"motor without limit",
+     JOINT("\"type\":\"revolute\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0],\"motor_speed\":1"),
+     "joints[0].motor_limit: must be given"},
+    {"negative damping",
+     JOINT("\"type\":\"revolute\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0],\"damping\":-1"),
+     "joints[0].damping: must be >= 0"},
     {"no joint type", JOINT("\"body_a\":0"), "joints[0].type: must be given"},
     {"joint key",
      JOINT("\"type\":\"revolute\",\"body_a\":0,\"body_b\":1,\"anchor\":[0,0],\"limit\":1"),
@@ -307,7 +315,8 @@ static void values_are_taken(void **state)
         "{\"type\":\"capsule\",\"vertices\":[[0,0],[1,0]],\"radius\":0.5}]}],"
         "\"joints\":[{\"type\":\"revolute\",\"body_a\":\"w\",\"body_b\":\"m\",\"anchor\":[1,2]},"
         "{\"type\":\"wheel\",\"body_a\":\"w\",\"body_b\":\"m\",\"anchor\":[1,2],\"axis\":[3,4],"
-        "\"lower\":-0.5,\"upper\":0.25,\"restitution\":0.75,\"collide\":true},"
+        "\"lower\":-0.5,\"upper\":0.25,\"restitution\":0.75,\"collide\":true,"
+        "\"stiffness\":11,\"damping\":12,\"rest\":-13,\"motor_speed\":-14,\"motor_limit\":15},"
         "{\"type\":\"rope\",\"body_a\":\"w\",\"body_b\":\"m\",\"anchor\":[1,2],\"anchor_b\":[5,6],"
         "\"upper\":9}]}",
         &problems);
@@ -328,6 +337,8 @@ static void values_are_taken(void **state)
     assert_true(j[0].anchor.y == 2 && !(j[0].lower > -HUGE_VAL) && !j[0].collide);
     assert_true(j[1].kind == CAROM_WHEEL && j[1].axis.x == 3 && j[1].lower == -0.5);
     assert_true(j[1].upper == 0.25 && j[1].restitution == 0.75 && j[1].collide);
+    assert_true(j[1].stiffness == 11 && j[1].damping == 12 && j[1].rest == -13);
+    assert_true(j[1].motor_speed == -14 && j[1].motor_limit == 15);
     assert_true(j[2].kind == CAROM_ROPE && j[2].anchor_b.y == 6 && j[2].upper == 9);
     crm_scene_free(scene);
 }

@@ -28,7 +28,7 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     const size_t rows = (size_t)r->world->n_joint_rows;
     double **const full[] = {&r->q_bar,    &r->v_bar,    &r->q_seed,  &r->v_seed,  &r->solve_bar,
                              &r->pose,     &r->pose_bar, &r->q_after, &r->v_after, &r->column_q,
-                             &r->column_v, &r->start_q,  &r->start_v};
+                             &r->column_v, &r->start_q,  &r->start_v, &r->late_bar};
     for (size_t k = 0; k < sizeof full / sizeof *full; k++) {
         *full[k] = crm_carve(b, n3, sizeof(double));
     }
@@ -92,6 +92,11 @@ static void clear_sink(const crm_reverse *r)
     clear(g->lengths, (size_t)w->n_joints);
     clear(g->lower, (size_t)w->n_joints);
     clear(g->upper, (size_t)w->n_joints);
+    clear(g->stiffness, (size_t)w->n_joints);
+    clear(g->damping, (size_t)w->n_joints);
+    clear(g->rest, (size_t)w->n_joints);
+    clear(g->motor_speed, (size_t)w->n_joints);
+    clear(g->motor_limit, (size_t)w->n_joints);
 }
 
 static void drop_negligible(const carom_world *w, double *x, double scale)

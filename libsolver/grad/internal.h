@@ -88,6 +88,7 @@ typedef struct crm_reverse {
     double *gap_bar;      /* per contact */
     carom_contact_bars bars;
     double *solve_bar;           /* 3 n_bodies: cotangent of the velocity of the solve under way */
+    double *late_bar;            /* 3 n_bodies: of v0, through the springs of stage 2 */
     double *pose;                /* 3 n_bodies: end of an iteration of stage 1 */
     double *pose_bar;            /* 3 n_bodies: its cotangent */
     crm_contact *moved;          /* contacts at the pose of the problem under way */
@@ -131,6 +132,17 @@ void crm_measure_vjp(const crm_joint *j, crm_measure m, const double *q, const d
 /* Of a joint's rows (6 numbers each) and errors, each may be NULL. */
 void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double *je_bar,
                    const double *error_bar, double *q_bar, int with_parameters);
+
+void crm_joint_give(const crm_reverse *r, int joint, const crm_joint_bar *bar);
+
+/* drive.c: springs and motors in rows.u and rows of a solve: after crm_solve_vjp, before
+ * crm_mass_vjp.  v_bar: of the velocity before the solve (of stage 2: of vh, and r->late_bar). */
+void crm_drive_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *v_bar,
+                   double *q_bar, double *h_bar, int with_parameters);
+/* The row of a motor that holds, in an iteration of stage 1: as joint_side_vjp. */
+void crm_motor_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int row, const double *v,
+                        const double *p, double *v_bar, double *q0_bar, double *h_bar,
+                        int with_parameters);
 
 /* reverse.c: the adjoint of one solve. */
 /* Reverse derivative of solve c with the cotangent v_bar of its velocity: fills r->bars.  Masses go

@@ -115,7 +115,7 @@ void crm_measure_vjp(const crm_joint *j, crm_measure m, const double *q, const d
     made_vjp(j, m, q, &f, &x, value_bar, q_bar, bar);
 }
 
-static void give(const crm_reverse *r, int joint, const crm_joint_bar *bar)
+void crm_joint_give(const crm_reverse *r, int joint, const crm_joint_bar *bar)
 {
     const carom_gradient *g = &r->sink.g;
     for (int i = 0; g->anchors && i < 2; i++) add(&g->anchors[2 * joint + i], bar->anchor[i], 1);
@@ -135,7 +135,7 @@ void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double *je_
         crm_measure_vjp(j, measures[k], q, je_bar ? &je_bar[6 * k] : NULL,
                         error_bar ? error_bar[k] : 0, q_bar, &bar);
     }
-    if (with_parameters) give(r, joint, &bar);
+    if (with_parameters) crm_joint_give(r, joint, &bar);
 }
 
 /* gap = sign (measure - bound), normal = sign u. */
@@ -159,5 +159,5 @@ void crm_limit_vjp(crm_reverse *r, const double *q, int limit, const carom_conta
     if (!with_parameters) return;
     double *bound = sign > 0 ? r->sink.g.lower : r->sink.g.upper;
     if (bound) bound[joint] -= value_bar * (m == CRM_TURN ? j->lever : 1);
-    give(r, joint, &to);
+    crm_joint_give(r, joint, &to);
 }

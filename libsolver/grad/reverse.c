@@ -210,6 +210,7 @@ carom_status crm_euler_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double
     if (e < 0) return e;
     crm_zero(r->world, v_bar);
     crm_free_velocity_vjp(r, s, s->h, 1, v_bar, h_bar, with_parameters);
+    crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar, with_parameters);
     if (with_parameters) crm_mass_vjp(r);
     crm_targets_vjp(r, s, s->v0, v_bar, r->gap_bar, h_bar, with_parameters);
     crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar, with_parameters);

@@ -69,7 +69,7 @@ static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int 
     double error_bar[CRM_MAX_JOINT_ROWS];
     double start_bar[CRM_MAX_JOINT_ROWS];
     crm_joint_rows(j, p, je, error);
-    for (int i = 0; i < j->n_rows; i++) {
+    for (int i = 0; i < j->n_held; i++) {
         const int row = first + i;
         const double ce_bar = r->bars.ce[row];
         add_row(v_bar, j->body_a, j->body_b, &w->rows.je[6 * row], -ce_bar);
@@ -82,6 +82,10 @@ static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int 
     }
     crm_joint_vjp(r, p, joint, NULL, error_bar, r->pose_bar, with_parameters);
     crm_joint_vjp(r, s->q0, joint, NULL, start_bar, q0_bar, with_parameters);
+    if (j->n_rows > j->n_held) {
+        crm_motor_side_vjp(r, s, joint, first + j->n_held, v, p, v_bar, q0_bar, h_bar,
+                           with_parameters);
+    }
 }
 
 /* Right-hand sides from the velocity v of the fixed point, which ends at p = q0 + h v. */
@@ -116,6 +120,7 @@ static carom_status pass_vjp(crm_reverse *r, crm_substep *s, double *q0_bar, dou
     if (e < 0) return e;
     crm_zero(r->world, r->solve_bar);
     crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, v0_bar, h_bar, with_parameters);
+    crm_drive_vjp(r, s, c, v0_bar, q0_bar, h_bar, with_parameters);
     if (with_parameters) crm_mass_vjp(r);
     sides_vjp(r, s, c->v, r->solve_bar, q0_bar, h_bar, with_parameters);
     crm_rows_vjp(r, s, c, r->gap_bar, NULL, q0_bar, with_parameters);
@@ -141,6 +146,7 @@ static carom_status stage_2_vjp(crm_reverse *r, crm_substep *s, double *q_bar, c
     if (e < 0) return e;
     crm_zero(r->world, r->solve_bar);
     crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, r->solve_bar, h_bar, with_parameters);
+    crm_drive_vjp(r, s, c, r->solve_bar, q_bar, h_bar, with_parameters);
     if (with_parameters) crm_mass_vjp(r);
     for (int k = 0; k < s->n_contacts; k++) {
         const int open = c->cn[k] != 0;
@@ -180,6 +186,7 @@ static carom_status bounce_vjp(crm_reverse *r, crm_substep *s, double *q_bar, do
     crm_zero(r->world, r->solve_bar);
     crm_zero(r->world, v_bar);
     crm_free_velocity_vjp(r, s, s->h, 1, v_bar, h_bar, with_parameters);
+    crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar, with_parameters);
     if (with_parameters) crm_mass_vjp(r);
     for (int k = 0; k < s->n_contacts; k++) bounce_side_vjp(r, s, k, v_bar, h_bar, with_parameters);
     crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar, with_parameters);
@@ -194,8 +201,9 @@ carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, doubl
     if (s->solve[1].kind == CRM_BOUNCE) {
         e = bounce_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
     } else {
+        crm_zero(r->world, r->late_bar);
         e = stage_2_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
-        crm_zero(r->world, v_bar);
+        crm_copy(r->world, v_bar, r->late_bar);
     }
     for (int k = s->n_solves - 1; e >= 0 && k > 1; k--) {
         e = crm_correction_vjp(r, s, &s->solve[k], q_bar, with_parameters);

@@ -40,6 +40,7 @@ static void keep_solve(const crm_island *i, const crm_substep *s, int index, crm
     to->mode = keep(b, c->mode, m, 1);
     to->ce = keep(b, c->ce, rows, sizeof(double));
     to->le = keep(b, c->le, rows, sizeof(double));
+    to->motor = keep(b, c->motor, rows, 1);
 }
 
 /* Copies what the reverse pass needs of a sub-step into a block; measures when b->base is NULL. */

@@ -9,15 +9,11 @@ static const double NO_DIRECTION = 1e-12;
 const char *carom_joint_kind_name(carom_joint_kind kind)
 {
     static const char *const names[CAROM_N_JOINT_KINDS] = {
-        [CAROM_REVOLUTE] = "revolute",
-        [CAROM_PRISMATIC] = "prismatic",
-        [CAROM_WELD] = "weld",
-        [CAROM_WHEEL] = "wheel",
-        [CAROM_DISTANCE] = "distance",
-        [CAROM_ROPE] = "rope",
-        [CAROM_LOCK_X] = "lock_x",
-        [CAROM_LOCK_Y] = "lock_y",
-        [CAROM_LOCK_ANGLE] = "lock_angle",
+        [CAROM_REVOLUTE] = "revolute", [CAROM_PRISMATIC] = "prismatic",
+        [CAROM_WELD] = "weld",         [CAROM_WHEEL] = "wheel",
+        [CAROM_DISTANCE] = "distance", [CAROM_ROPE] = "rope",
+        [CAROM_TARGET] = "target",     [CAROM_LOCK_X] = "lock_x",
+        [CAROM_LOCK_Y] = "lock_y",     [CAROM_LOCK_ANGLE] = "lock_angle",
     };
     const int k = (int)kind;
     return k >= 0 && k < CAROM_N_JOINT_KINDS ? names[k] : NULL;
@@ -31,8 +27,8 @@ carom_joint_def carom_joint_defaults(carom_joint_kind kind)
     d.axis.x = 1;
     d.lower = -HUGE_VAL;
     d.upper = HUGE_VAL;
-    d.collide = kind == CAROM_DISTANCE || kind == CAROM_ROPE || kind == CAROM_LOCK_X ||
-                kind == CAROM_LOCK_Y || kind == CAROM_LOCK_ANGLE;
+    d.collide = kind == CAROM_DISTANCE || kind == CAROM_ROPE || kind == CAROM_TARGET ||
+                kind == CAROM_LOCK_X || kind == CAROM_LOCK_Y || kind == CAROM_LOCK_ANGLE;
     return d;
 }
 
@@ -99,6 +95,50 @@ static double distance(const carom_joint_def *d)
     return hypot(d->anchor_b.x - d->anchor.x, d->anchor_b.y - d->anchor.y);
 }
 
+/* One measure is left free: it can have limits, a spring, a motor. */
+static int moves_one_way(carom_joint_kind kind)
+{
+    return kind == CAROM_REVOLUTE || kind == CAROM_PRISMATIC || kind == CAROM_WHEEL;
+}
+
+static int not_negative(double x)
+{
+    return x >= 0 && x < HUGE_VAL;
+}
+
+static carom_status check_drive(carom_world *w, const carom_joint_def *d)
+{
+    const int id = w->n_joints;
+    const char *name = carom_joint_kind_name(d->kind);
+    const int pulls = moves_one_way(d->kind) || d->kind == CAROM_ROPE || d->kind == CAROM_TARGET;
+    if (!not_negative(d->stiffness) || !not_negative(d->damping) || !isfinite(d->rest)) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT,
+                              "joint %d: spring %g, damping %g, rest %g: must be finite, the first "
+                              "two 0 or more",
+                              id, d->stiffness, d->damping, d->rest);
+    }
+    if (!not_negative(d->motor_limit) || !isfinite(d->motor_speed)) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT,
+                              "joint %d: motor limit %g must be finite and 0 or more, its speed %g "
+                              "finite",
+                              id, d->motor_limit, d->motor_speed);
+    }
+    if ((d->stiffness > 0 || d->damping > 0) && !pulls) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT,
+                              "joint %d: a %s joint leaves nothing to a spring; leave stiffness "
+                              "and damping 0",
+                              id, name);
+    }
+    if (d->motor_limit > 0 && !moves_one_way(d->kind)) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT,
+                              "joint %d: a %s joint has no motor; leave motor_limit 0", id, name);
+    }
+    if (d->kind == CAROM_TARGET && !(d->stiffness > 0)) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: a target pulls; give stiffness", id);
+    }
+    return CAROM_OK;
+}
+
 /* Limits hold at the present poses: at turn 0, way 0, or the present distance. */
 static carom_status check_limits(carom_world *w, const carom_joint_def *d)
 {
@@ -117,8 +157,9 @@ static carom_status check_limits(carom_world *w, const carom_joint_def *d)
         return crm_world_fail(w, CAROM_E_ARGUMENT,
                               "joint %d: a %s joint has no limits; leave them infinite", id, name);
     }
-    if (rope && !given) {
-        return crm_world_fail(w, CAROM_E_ARGUMENT, "joint %d: a rope needs a limit; give upper",
+    if (rope && !given && !(d->stiffness > 0)) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT,
+                              "joint %d: a rope needs a limit or a spring; give upper or stiffness",
                               id);
     }
     if (!(d->lower < d->upper)) {
@@ -158,9 +199,15 @@ static crm_joint make_joint(const carom_world *w, const carom_joint_def *d)
     j.lower = d->lower;
     j.upper = d->upper;
     j.restitution = d->restitution;
+    j.stiffness = d->stiffness;
+    j.damping = d->damping;
+    j.rest = d->rest;
+    j.motor_speed = d->motor_speed;
+    j.motor_limit = d->motor_limit;
     j.collide = d->collide != 0;
     j.first_row = w->n_joint_rows;
-    j.n_rows = crm_joint_measures(d->kind, &measures);
+    j.n_held = crm_joint_measures(d->kind, &measures);
+    j.n_rows = j.n_held + (d->motor_limit > 0);
     return j;
 }
 
@@ -171,6 +218,7 @@ carom_status carom_world_add_joint(carom_world *world, const carom_joint_def *de
     carom_status e = check_bodies(w, def);
     if (!e) e = check_places(w, def);
     if (!e) e = check_limits(w, def);
+    if (!e) e = check_drive(w, def);
     if (e) return e;
     void *joints = w->joints;
     e = crm_reserve(&w->memory, &joints, &w->max_joints, w->n_joints + 1, sizeof *w->joints);

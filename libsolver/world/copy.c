@@ -94,6 +94,7 @@ static carom_status copy_progress(carom_world *w, const carom_world *from)
     for (int i = 0; i < 2; i++) {
         copy(w->joint_force[i], from->joint_force[i], w->n_joint_rows, sizeof(double));
     }
+    copy(w->joint_total, from->joint_total, w->n_joint_rows, sizeof(double));
     w->n_steps = from->n_steps;
     return CAROM_OK;
 }

@@ -76,7 +76,8 @@ static carom_status run_column(carom_world *w, int n, int first, double h)
     return worst;
 }
 
-/* Whether all inner sub-steps went the same way: the same contacts closed, sticking or slipping. */
+/* Whether all inner sub-steps went the same way: the same contacts closed, sticking or slipping,
+ * and the same motors at their limits. */
 static int one_mode(const carom_world *w, int n_inner)
 {
     const crm_substep *a = &w->inner[0];
@@ -87,6 +88,10 @@ static int one_mode(const carom_world *w, int n_inner)
             for (int stage = 0; stage < 2; stage++) {
                 if (b->solve[stage].mode[k] != a->solve[0].mode[k]) return 0;
             }
+        }
+        for (int k = 0; w->island->n_driven && k < w->island->n_rows; k++) {
+            if (b->solve[0].motor[k] != a->solve[0].motor[k]) return 0;
+            if (b->solve[1].motor[k] != a->solve[0].motor[k]) return 0;
         }
     }
     return 1;

@@ -26,8 +26,9 @@ typedef struct crm_body {
     int n_shapes;
     int collide;
     int sensor;
-    int unknown;  /* index in the island under way, -1: static */
-    double reach; /* farthest point of its shapes from the position [m]; set by seal */
+    int unknown;   /* index in the island under way, -1: static */
+    int n_springs; /* springs and motors on it; set by seal */
+    double reach;  /* farthest point of its shapes from the position [m]; set by seal */
     carom_filter filter;
 } crm_body;
 
@@ -53,9 +54,15 @@ typedef struct crm_joint {
     double lower;       /* limits of what crm_limit_measure says [m, rad]; -HUGE_VAL: none */
     double upper;       /* HUGE_VAL: none */
     double restitution; /* at its limits */
+    double stiffness;   /* spring on what crm_spring_measures says [N/m, N m/rad] */
+    double damping;     /* [N s/m, N m s/rad] */
+    double rest;        /* where the spring is at rest [m, rad] */
+    double motor_speed; /* of what crm_motor_measure says [m/s, rad/s] */
+    double motor_limit; /* largest force or torque of the motor [N, N m]; 0: no motor */
     int collide;
     int first_row; /* among the rows of all joints */
-    int n_rows;
+    int n_rows;    /* held, then that of the motor */
+    int n_held;
 } crm_joint;
 
 /* What a row of a joint measures, with d from the anchor of A to that of B. */
@@ -109,17 +116,26 @@ typedef enum crm_solve_kind {
 
 typedef struct crm_solve {
     crm_solve_kind kind;
-    double *q;           /* 3 n_bodies: where the rows are */
-    double *v;           /* 3 n_bodies: the solution, zero for static bodies */
-    double share;        /* of a correction: how much of it was taken, 1 or less */
-    double *cn;          /* per contact */
-    double *ct;          /* per contact */
-    double *ln;          /* per contact */
-    double *lt;          /* per contact */
-    double *ce;          /* per joint row */
-    double *le;          /* per joint row */
-    unsigned char *mode; /* per contact */
+    double *q;            /* 3 n_bodies: where the rows are */
+    double *v;            /* 3 n_bodies: the solution, zero for static bodies */
+    double share;         /* of a correction: how much of it was taken, 1 or less */
+    double *cn;           /* per contact */
+    double *ct;           /* per contact */
+    double *ln;           /* per contact */
+    double *lt;           /* per contact */
+    double *ce;           /* per joint row */
+    double *le;           /* per joint row */
+    unsigned char *mode;  /* per contact */
+    unsigned char *motor; /* per joint row: crm_motor_state */
 } crm_solve;
+
+/* How a motor's row is in a solve. */
+typedef enum crm_motor_state {
+    CRM_MOTOR_OFF,   /* no motor, or none here: a row of zeros */
+    CRM_MOTOR_HOLDS, /* its speed is met */
+    CRM_MOTOR_MINUS, /* at its limit, against the measure: a row of zeros and a given impulse */
+    CRM_MOTOR_PLUS
+} crm_motor_state;
 
 /* The maps that a sub-step can be. */
 typedef enum crm_map {
@@ -205,6 +221,7 @@ typedef struct crm_island {
     int *joints;
     int n_rows;    /* of the joints */
     int n_limited; /* joints with limits */
+    int n_driven;  /* joints with a spring or motor */
     int n_pairs;
     carom_pair *pairs; /* shapes; also with static bodies */
     int clock;         /* the body whose owed time the frame takes over */
@@ -296,6 +313,7 @@ struct carom_world {
     crm_touches touches, next;
     int first_touch;        /* of the island, in next */
     double *joint_force[2]; /* per joint row: as crm_touch.force_n [N] */
+    double *joint_total;    /* per joint row: over the last sub-step that took time [N] */
     long revision;          /* counts changes of parameters */
     long n_steps;
     carom_step_stats *stats; /* of the step under way */
@@ -401,6 +419,11 @@ void crm_rows_at(carom_world *w, crm_substep *s, const double *q);
 void crm_free_acceleration(const carom_world *w, int body, double a[3]);
 /* rows.u = v + h (W f + g). */
 void crm_free_velocity(carom_world *w, const crm_substep *s, const double *v, double h);
+/* rows.u of a solve from the velocities before it, with its springs; rows at c->q in place, where
+ * its motors get theirs as c->motor says. */
+void crm_solve_velocity(carom_world *w, const crm_substep *s, const crm_solve *c);
+/* The same with all motors that can act holding their speeds. */
+void crm_solve_start(carom_world *w, const crm_substep *s, crm_solve *c);
 /* The problem of the rows in place with the right-hand sides of one solve. */
 carom_contact_problem crm_problem(carom_world *w, const crm_substep *s, const crm_solve *c);
 /* c->cn: restitution e u_n of an approach of v faster than v_rest, equations.md (3); gap / h for
@@ -422,7 +445,7 @@ carom_vec2 crm_measure_direction(const crm_joint *j, crm_measure m, const double
                                  const crm_joint_frame *f);
 /* The measure at q [m], and its row: the derivative by (q_a, q_b). */
 double crm_measure_at(const crm_joint *j, crm_measure m, const double *q, double row[6]);
-/* Rows of J_e (6 each) and position errors [m] of a joint. */
+/* Rows of J_e (6 each) and position errors [m] of a joint; zeros for that of its motor. */
 void crm_joint_rows(const crm_joint *j, const double *q, double *je, double *error);
 /* Largest joint error at q [m]. */
 double crm_joint_drift(const carom_world *w, const double *q);
@@ -447,6 +470,47 @@ int crm_limit_in(const carom_world *w, int slot);
 carom_status crm_detect_limits(carom_world *w, const double *q, double reach, double margin);
 /* Of a contact, or of a limit. */
 double crm_restitution(const carom_world *w, const crm_contact *c);
+
+/* drive.c: springs and motors of joints. */
+/* What a joint's spring works on; their number. */
+int crm_spring_measures(carom_joint_kind kind, crm_measure measures[2]);
+crm_measure crm_motor_measure(carom_joint_kind kind);
+int crm_joint_is_driven(const crm_joint *j);
+/* Impulse b = share h f along the row of a measure, and what it is made of. */
+typedef struct crm_push {
+    double row[6];
+    double h, share;
+    double way;                /* from rest [m] */
+    double speed;              /* J v [m/s] */
+    double weight;             /* n J W J' with the number of springs n of each body */
+    double stiffness, damping; /* as given and per meter */
+    double k, d;               /* softened so that no sub-step is too long for them */
+    double force;
+} crm_push;
+/* Share of h of a solve: 1, 1/2 of a stage, 0 where no time passes. */
+double crm_share(const crm_solve *c);
+/* Velocity of a body before a solve, as its springs see it. */
+double crm_seen_velocity(const crm_substep *s, const crm_solve *c, int k);
+/* x (1 + (x times)^4)^(-1/4), which is never above 1 / times, and its derivative by x. */
+double crm_soften(double x, double times);
+double crm_soften_slope(double x, double times);
+crm_push crm_spring_push(const carom_world *w, const crm_substep *s, const crm_solve *c,
+                         const crm_joint *j, crm_measure m);
+/* Impulses of all springs of the island to rows.u. */
+void crm_springs(carom_world *w, const crm_substep *s, const crm_solve *c);
+/* Impulse of a motor at its limit, from c->motor [N s, per meter]. */
+double crm_motor_impulse(const crm_substep *s, const crm_solve *c, const crm_joint *j, int row);
+/* Rows and given impulses of motors as c->motor says. */
+void crm_motors(carom_world *w, const crm_substep *s, const crm_solve *c);
+/* After a solve: motors beyond their limit stop at it, and those at it that need less hold again.
+ * Returns the number of changes. */
+int crm_motors_settle(carom_world *w, const crm_substep *s, crm_solve *c);
+/* Speed of a motor [m/s]. */
+double crm_motor_speed(const crm_joint *j);
+/* c_e of motors in a solve: their speeds are to be met. */
+void crm_motor_sides(const carom_world *w, crm_solve *c);
+/* Largest speed in the mass metric that springs and motors give within h. */
+double crm_drive_gain(const carom_world *w, const crm_substep *s);
 
 /* substep.c: memory of sub-steps and rows; contacts found so far are kept when it grows. */
 carom_status crm_substep_create(carom_world *w, crm_substep *s);

@@ -208,6 +208,7 @@ static void fill_islands(carom_world *w)
         i->joints[i->n_joints++] = k;
         i->n_rows += w->joints[k].n_rows;
         i->n_limited += crm_joint_has_limits(&w->joints[k]);
+        i->n_driven += crm_joint_is_driven(&w->joints[k]);
     }
     for (int k = 0; k < s->n_pairs; k++) {
         crm_island *i = &s->list[s->label[pair_body(w, s->found[k])]];

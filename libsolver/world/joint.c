@@ -16,6 +16,7 @@ static const row_list HELD[CAROM_N_JOINT_KINDS] = {
     [CAROM_WHEEL] = {1, {CRM_ASIDE}},
     [CAROM_DISTANCE] = {1, {CRM_APART}},
     [CAROM_ROPE] = {0, {CRM_APART}},
+    [CAROM_TARGET] = {0, {CRM_APART}},
     [CAROM_LOCK_X] = {1, {CRM_ACROSS_X}},
     [CAROM_LOCK_Y] = {1, {CRM_ACROSS_Y}},
     [CAROM_LOCK_ANGLE] = {1, {CRM_TURN}},
@@ -106,9 +107,12 @@ double crm_measure_at(const crm_joint *j, crm_measure m, const double *q, double
 
 void crm_joint_rows(const crm_joint *j, const double *q, double *je, double *error)
 {
-    for (int k = 0; k < j->n_rows; k++) {
+    for (int k = 0; k < j->n_held; k++) {
         error[k] = crm_measure_at(j, HELD[j->kind].measure[k], q, &je[6 * k]);
     }
+    if (j->n_rows == j->n_held) return;
+    memset(&je[6 * j->n_held], 0, 6 * sizeof *je);
+    error[j->n_held] = 0;
 }
 
 double crm_joint_drift(const carom_world *w, const double *q)
@@ -124,4 +128,34 @@ double crm_joint_drift(const carom_world *w, const double *q)
         }
     }
     return largest;
+}
+
+/* A measure's multiplier f acts on B along the direction that it sees, or as a torque. */
+static void add_measure(const carom_world *w, const crm_joint *j, crm_measure m, double f,
+                        carom_joint_force *to)
+{
+    const crm_joint_frame at = crm_joint_frame_at(j, w->q);
+    const carom_vec2 u = crm_measure_direction(j, m, w->q, &at);
+    to->force.x += f * u.x;
+    to->force.y += f * u.y;
+    if (m == CRM_TURN) to->torque += f * j->lever;
+}
+
+carom_joint_force carom_world_joint_force(const carom_world *world, int joint)
+{
+    const carom_world *w = world;
+    carom_joint_force total = {{0, 0}, 0};
+    if (joint < 0 || joint >= w->n_joints || !w->joint_total) return total;
+    const crm_joint *j = &w->joints[joint];
+    for (int k = 0; k < j->n_rows; k++) {
+        const crm_measure m = k < j->n_held ? HELD[j->kind].measure[k] : crm_motor_measure(j->kind);
+        add_measure(w, j, m, w->joint_total[j->first_row + k], &total);
+    }
+    for (int k = carom_world_n_contacts(w); k < w->touches.n; k++) {
+        const crm_touch *t = &w->touches.list[k];
+        if (crm_limit_joint(t->contact.limit) != joint) continue;
+        const double f = crm_limit_sign(t->contact.limit) * (t->force_n[0] + t->force_n[1]);
+        add_measure(w, j, crm_limit_measure(j->kind), f, &total);
+    }
+    return total;
 }

@@ -169,25 +169,45 @@ void crm_velocity_targets(carom_world *w, const crm_substep *s, const double *v,
         }
     }
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
+    crm_motor_sides(w, c);
 }
 
-carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const crm_solve *c)
+void crm_solve_velocity(carom_world *w, const crm_substep *s, const crm_solve *c)
 {
-    crm_rows_at(w, s, c->q);
     switch (c->kind) {
     case CRM_VELOCITY: crm_free_velocity(w, s, s->v0, s->h); break;
     case CRM_CORRECTION:
+    case CRM_HOLD: /* the velocity before it is not known here, and no derivative asks for it */
+    case CRM_HOLD_SPEED:
         memset(w->rows.u, 0, 3 * (size_t)w->island->n_bodies * sizeof(double));
         break;
     case CRM_IMPACT: crm_free_velocity(w, s, s->v0, 0); break;
     case CRM_STAGE_1: crm_free_velocity(w, s, s->v0, 0.5 * s->h); break;
     case CRM_STAGE_2: crm_free_velocity(w, s, c[-1].v, 0.5 * s->h); break;
     case CRM_BOUNCE: crm_free_velocity(w, s, s->v0, s->h); break;
-    case CRM_HOLD:
-    case CRM_HOLD_SPEED:
-        /* The velocity before it is not known here, and no derivative asks for it. */
-        memset(w->rows.u, 0, 3 * (size_t)w->island->n_bodies * sizeof(double));
-        return crm_hold_problem(w, s, c);
     }
-    return crm_problem(w, s, c);
+    if (!w->island->n_driven || !(crm_share(c) > 0)) return;
+    crm_springs(w, s, c);
+    crm_motors(w, s, c);
+}
+
+void crm_solve_start(carom_world *w, const crm_substep *s, crm_solve *c)
+{
+    const unsigned char state = crm_share(c) > 0 ? CRM_MOTOR_HOLDS : CRM_MOTOR_OFF;
+    int row = 0;
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        for (int i = 0; i < j->n_rows; i++) {
+            c->motor[row++] = i < j->n_held ? CRM_MOTOR_OFF : state;
+        }
+    }
+    crm_solve_velocity(w, s, c);
+}
+
+carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const crm_solve *c)
+{
+    crm_rows_at(w, s, c->q);
+    crm_solve_velocity(w, s, c);
+    const int holds = c->kind == CRM_HOLD || c->kind == CRM_HOLD_SPEED;
+    return holds ? crm_hold_problem(w, s, c) : crm_problem(w, s, c);
 }

@@ -69,6 +69,19 @@ static void set_scales(carom_world *w)
     w->recovery = fmax(w->rest_speed, w->settings.margin * w->length / w->settings.dt);
 }
 
+/* Springs and motors on each body; a target pulls in two directions. */
+static void count_springs(carom_world *w)
+{
+    for (int b = 0; b < w->n_bodies; b++) w->bodies[b].n_springs = 0;
+    for (int k = 0; k < w->n_joints; k++) {
+        const crm_joint *j = &w->joints[k];
+        if (!crm_joint_is_driven(j)) continue;
+        const int n = j->kind == CAROM_TARGET ? 2 : 1;
+        w->bodies[j->body_a].n_springs += n;
+        w->bodies[j->body_b].n_springs += n;
+    }
+}
+
 static void count_moving(carom_world *w)
 {
     w->n_moving = 0;
@@ -90,6 +103,7 @@ static void lay_world(carom_world *w, crm_block *b)
     for (int k = 0; k < 2; k++) {
         w->joint_force[k] = crm_carve(b, (size_t)w->n_joint_rows, sizeof(double));
     }
+    w->joint_total = crm_carve(b, (size_t)w->n_joint_rows, sizeof(double));
     w->owes = crm_carve(b, (size_t)w->n_bodies, 1);
     w->owes_saved = crm_carve(b, (size_t)w->n_bodies, 1);
     w->joined = crm_carve(b, (size_t)w->n_joints, sizeof *w->joined);
@@ -205,6 +219,7 @@ static carom_status seal(carom_world *w, int as_is)
     carom_step_stats *stats = w->stats;
     set_scales(w);
     count_moving(w);
+    count_springs(w);
     carom_status e = allocate(w);
     if (!e) {
         crm_sort_joined(w);

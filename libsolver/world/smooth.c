@@ -45,6 +45,23 @@ static void first_sides(const carom_world *w, const crm_substep *s, crm_solve *c
     for (int k = 0; k < w->island->n_rows; k++) {
         c->ce[k] = (w->rows.error[k] - s->joint_target[k]) / s->h;
     }
+    crm_motor_sides(w, c);
+}
+
+/* The same of a motor's row: the speed of its measure over the sub-step.  At its limit it moves
+ * nothing. */
+static double next_motor_side(const crm_substep *s, const crm_joint *j, int row, const crm_solve *c,
+                              crm_solve *next)
+{
+    double je[6];
+    const crm_measure m = crm_motor_measure(j->kind);
+    const double before = crm_measure_at(j, m, s->q0, je);
+    const double u = crm_row_dot(je, c->v, j->body_a, j->body_b);
+    const double way = crm_measure_at(j, m, s->q1, je) - before;
+    next->ce[row] = 0;
+    if (c->motor[row] != CRM_MOTOR_HOLDS) return 0;
+    next->ce[row] = way / s->h - crm_motor_speed(j) - u;
+    return s->h * fabs(next->ce[row] - c->ce[row]);
 }
 
 /* Right-hand sides of joint j in the next iteration; `first` is its first row in the island. */
@@ -55,13 +72,14 @@ static double next_joint_sides(const carom_world *w, const crm_substep *s, const
     double je[6 * CRM_MAX_JOINT_ROWS];
     double error[CRM_MAX_JOINT_ROWS];
     crm_joint_rows(j, s->q1, je, error);
-    for (int k = 0; k < j->n_rows; k++) {
+    for (int k = 0; k < j->n_held; k++) {
         const int row = first + k;
         const double u = crm_row_dot(&w->rows.je[6 * row], c->v, j->body_a, j->body_b);
         next->ce[row] = (error[k] - s->joint_target[row]) / s->h - u;
         largest = fmax(largest, s->h * fabs(next->ce[row] - c->ce[row]));
     }
-    return largest;
+    if (j->n_rows == j->n_held) return largest;
+    return fmax(largest, next_motor_side(s, j, first + j->n_held, c, next));
 }
 
 /* Right-hand sides of the next iteration from the end pose of this one: the true gap, slip and
@@ -122,7 +140,7 @@ static carom_status stage_1(carom_world *w, crm_substep *s)
     c->kind = CRM_STAGE_1;
     crm_copy(w, c->q, s->q0);
     crm_rows_at(w, s, s->q0);
-    crm_free_velocity(w, s, s->v0, 0.5 * s->h);
+    crm_solve_start(w, s, c);
     set_targets(w, s);
     first_sides(w, s, c);
     double moved = 0;
@@ -149,13 +167,14 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
     c->kind = CRM_STAGE_2;
     crm_copy(w, c->q, s->q1);
     crm_rows_at(w, s, s->q1);
-    crm_free_velocity(w, s, last->v, 0.5 * s->h);
+    crm_solve_start(w, s, c);
     for (int k = 0; k < s->n_contacts; k++) {
         c->cn[k] = s->moved[k].gap > slop ? s->moved[k].gap / s->h : 0;
         c->ct[k] = drive(w, s, k);
         c->mode[k] = last->mode[k];
     }
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
+    crm_motor_sides(w, c);
     const carom_status e = crm_solve_run(w, s, c, 1);
     if (e < 0) return e;
     crm_copy(w, s->v1, c->v);
@@ -221,6 +240,7 @@ static int bounce_sides(const carom_world *w, const crm_substep *s, crm_solve *c
         any |= c->cn[k] < 0;
     }
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
+    crm_motor_sides(w, c);
     return any;
 }
 
@@ -236,7 +256,8 @@ static double mass_speed(const carom_world *w, const double *v)
     return sqrt(sum);
 }
 
-/* What holds at rest does no work: |v| <= |v0| + h |W f + g| in the mass metric.  Far beyond that
+/* What holds at rest does no work: |v| <= |v0| + h |W f + g| in the mass metric,
+ * with f also of springs and motors.  Far beyond that
  * a sub-step has turned joints so far that Newton's method found another of their poses. */
 static int gains_energy(const carom_world *w, const crm_substep *s, const double *v)
 {
@@ -250,7 +271,8 @@ static int gains_energy(const carom_world *w, const crm_substep *s, const double
         push += w->inertia[b] * a[0] * a[0] + w->mass[b] * (a[1] * a[1] + a[2] * a[2]);
         mass += w->mass[b];
     }
-    const double most = mass_speed(w, s->v0) + s->h * sqrt(push) + w->recovery * sqrt(mass);
+    const double most =
+        mass_speed(w, s->v0) + s->h * sqrt(push) + w->recovery * sqrt(mass) + crm_drive_gain(w, s);
     return mass_speed(w, v) > GAIN * most;
 }
 
@@ -263,8 +285,8 @@ static carom_status bounce(carom_world *w, crm_substep *s, int *done)
     c->kind = CRM_BOUNCE;
     crm_copy(w, c->q, s->q1);
     crm_rows_at(w, s, s->q1);
+    crm_solve_start(w, s, c);
     if (!bounce_sides(w, s, c)) return CAROM_OK;
-    crm_free_velocity(w, s, s->v0, s->h);
     carom_status e = crm_solve_run(w, s, c, 1);
     const int unsolved = e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION;
     if (unsolved || (e >= 0 && gains_energy(w, s, c->v))) {
@@ -307,7 +329,7 @@ carom_status crm_impact(carom_world *w, int plastic)
     c->kind = CRM_IMPACT;
     crm_copy(w, c->q, s->q0);
     crm_rows_at(w, s, s->q0);
-    crm_free_velocity(w, s, s->v0, 0);
+    crm_solve_start(w, s, c);
     carom_status e;
     if (plastic) {
         s->restitution = 0;

@@ -78,6 +78,11 @@ static void hash_joints(crm_coder *c, const carom_world *w)
         hash_number(c, j->lower);
         hash_number(c, j->upper);
         hash_number(c, j->restitution);
+        hash_number(c, j->stiffness);
+        hash_number(c, j->damping);
+        hash_number(c, j->rest);
+        hash_number(c, j->motor_speed);
+        hash_number(c, j->motor_limit);
     }
     hash_whole(c, w->n_excluded);
     for (int k = 0; k < w->n_excluded; k++) {

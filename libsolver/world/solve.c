@@ -5,6 +5,9 @@
 #include <math.h>
 #include <stdlib.h>
 
+/* How often motors may stop or start to hold in one solve. */
+enum { MAX_SETTLINGS = 20 };
+
 double crm_rounding(const carom_world *w)
 {
     double far = 0;
@@ -41,7 +44,7 @@ static void take_velocities(const carom_world *w, const double *v, double *to)
     }
 }
 
-carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use_guess)
+static carom_status run_once(carom_world *w, crm_substep *s, crm_solve *c, int use_guess)
 {
     if (!s->n_contacts && !w->island->n_rows) {
         s->degenerate = 0;
@@ -59,6 +62,32 @@ carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use
     add_stats(w, &stats);
     if (c->kind != CRM_CORRECTION) s->degenerate = stats.degenerate;
     take_velocities(w, w->rows.v, c->v);
+    return e;
+}
+
+/* Impulses of motors at their limits, in place of those of their rows. */
+static void take_motors(const carom_world *w, const crm_substep *s, crm_solve *c)
+{
+    int row = 0;
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        row += j->n_rows;
+        if (j->n_rows > j->n_held && c->motor[row - 1] != CRM_MOTOR_HOLDS) {
+            c->le[row - 1] = crm_motor_impulse(s, c, j, row - 1);
+        }
+    }
+}
+
+carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use_guess)
+{
+    carom_status e = run_once(w, s, c, use_guess);
+    if (!w->island->n_driven || !(crm_share(c) > 0)) return e;
+    for (int k = 0; e >= 0 && crm_motors_settle(w, s, c); k++) {
+        if (k == MAX_SETTLINGS) return CAROM_E_NO_SOLUTION;
+        crm_solve_velocity(w, s, c);
+        e = run_once(w, s, c, 1);
+    }
+    if (e >= 0) take_motors(w, s, c);
     return e;
 }
 
@@ -189,11 +218,13 @@ static carom_status reserve_touches(carom_world *w, crm_touches *t, int n)
 static void save_joint_forces(carom_world *w)
 {
     const crm_substep *s = &w->sub;
+    const crm_solve *x = s->solve;
     int row = 0;
     for (int k = 0; k < w->island->n_joints; k++) {
         const crm_joint *j = &w->joints[w->island->joints[k]];
         for (int r = j->first_row; r < j->first_row + j->n_rows; r++, row++) {
-            for (int i = 0; i < 2; i++) w->joint_force[i][r] = per_time(s, i) * s->solve[i].le[row];
+            for (int i = 0; i < 2; i++) w->joint_force[i][r] = per_time(s, i) * x[i].le[row];
+            if (s->h > 0) w->joint_total[r] = whole(s, x[0].le[row], x[1].le[row]) / s->h;
         }
     }
 }

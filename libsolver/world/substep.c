@@ -38,6 +38,7 @@ static void lay_states(const carom_world *w, int n, crm_block *b, void *object)
         c->v = crm_carve(b, n3, sizeof(double));
         c->ce = crm_carve(b, rows, sizeof(double));
         c->le = crm_carve(b, rows, sizeof(double));
+        c->motor = crm_carve(b, rows, 1);
     }
 }
 

@@ -73,7 +73,7 @@ static void free_built(carom_world *w)
 
 void crm_free_sealed(carom_world *w)
 {
-    w->joint_force[0] = w->joint_force[1] = NULL;
+    w->joint_force[0] = w->joint_force[1] = w->joint_total = NULL;
     w->carry = NULL;
     crm_free(&w->memory, w->seal_block, w->seal_bytes, 1);
     w->seal_block = NULL;

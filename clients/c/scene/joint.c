@@ -3,32 +3,35 @@
 #include <string.h>
 
 /* Names of a joint's keys that only some types have. */
-enum { AXIS = 1, ANCHOR_B = 2, LIMITS = 4 };
+enum { AXIS = 1, ANCHOR_B = 2, LIMITS = 4, SPRING = 8, MOTOR = 16, MAX_KEYS = 24 };
 
 static int keys_of(carom_joint_kind kind)
 {
     switch (kind) {
-    case CAROM_REVOLUTE: return LIMITS;
+    case CAROM_REVOLUTE: return LIMITS | SPRING | MOTOR;
     case CAROM_PRISMATIC:
-    case CAROM_WHEEL: return AXIS | LIMITS;
+    case CAROM_WHEEL: return AXIS | LIMITS | SPRING | MOTOR;
     case CAROM_DISTANCE: return ANCHOR_B;
-    case CAROM_ROPE: return ANCHOR_B | LIMITS;
+    case CAROM_ROPE: return ANCHOR_B | LIMITS | SPRING;
+    case CAROM_TARGET: return SPRING;
     default: return 0;
     }
 }
 
 /* The keys that a joint of these has, NULL-terminated. */
-static void list_keys(int has, const char *keys[16])
+static void list_keys(int has, const char *keys[MAX_KEYS])
 {
-    static const char *const all[] = {"type", "body_a", "body_b", "anchor", "collide", "name"};
+    static const struct {
+        int of; /* 0: every joint has it */
+        const char *key;
+    } all[] = {
+        {0, "type"},         {0, "body_a"},     {0, "body_b"},           {0, "anchor"},
+        {0, "collide"},      {0, "name"},       {AXIS, "axis"},          {ANCHOR_B, "anchor_b"},
+        {LIMITS, "lower"},   {LIMITS, "upper"}, {LIMITS, "restitution"}, {SPRING, "stiffness"},
+        {SPRING, "damping"}, {SPRING, "rest"},  {MOTOR, "motor_speed"},  {MOTOR, "motor_limit"}};
     int n = 0;
-    for (size_t k = 0; k < sizeof all / sizeof *all; k++) keys[n++] = all[k];
-    if (has & AXIS) keys[n++] = "axis";
-    if (has & ANCHOR_B) keys[n++] = "anchor_b";
-    if (has & LIMITS) {
-        keys[n++] = "lower";
-        keys[n++] = "upper";
-        keys[n++] = "restitution";
+    for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
+        if (!all[k].of || (has & all[k].of)) keys[n++] = all[k].key;
     }
     keys[n] = NULL;
 }
@@ -107,8 +110,40 @@ static void read_limits(crm_problems *problems, const crm_node *node, carom_join
     if (!(def->lower < def->upper)) {
         crm_fault(problems, &lower, "must be below upper, %.17g", def->upper);
     }
-    if (def->kind == CAROM_ROPE && !lower.json && !upper.json) {
-        crm_fault(problems, &upper, "must be given: the length of the rope [m]");
+    const crm_node spring = crm_member(node, "stiffness");
+    if (def->kind == CAROM_ROPE && !lower.json && !upper.json && !spring.json) {
+        crm_fault(problems, &upper, "must be given: the length of the rope [m], or a stiffness");
+    }
+}
+
+/* A number that is 0 or more. */
+static void read_strength(crm_problems *problems, const crm_node *node, const char *key, double *x)
+{
+    const crm_node at = crm_member(node, key);
+    if (!crm_get_number(problems, &at, x) || *x >= 0) return;
+    crm_fault(problems, &at, "must be >= 0, is %.17g", *x);
+}
+
+static void read_spring(crm_problems *problems, const crm_node *node, carom_joint_def *def)
+{
+    const crm_node stiffness = crm_member(node, "stiffness");
+    const crm_node rest = crm_member(node, "rest");
+    read_strength(problems, node, "stiffness", &def->stiffness);
+    read_strength(problems, node, "damping", &def->damping);
+    crm_get_number(problems, &rest, &def->rest);
+    if (def->kind == CAROM_TARGET && !stiffness.json) {
+        crm_fault(problems, &stiffness, "must be given: how hard the target pulls [N/m]");
+    }
+}
+
+static void read_motor(crm_problems *problems, const crm_node *node, carom_joint_def *def)
+{
+    const crm_node speed = crm_member(node, "motor_speed");
+    const crm_node limit = crm_member(node, "motor_limit");
+    crm_get_number(problems, &speed, &def->motor_speed);
+    read_strength(problems, node, "motor_limit", &def->motor_limit);
+    if (speed.json && !limit.json) {
+        crm_fault(problems, &limit, "must be given: the motor's largest torque or force");
     }
 }
 
@@ -133,7 +168,7 @@ static int read_kind(crm_problems *problems, const crm_node *node, carom_joint_k
 void crm_joint_read(crm_problems *problems, const crm_node *node, const crm_scene *scene,
                     carom_joint_def *def)
 {
-    const char *keys[16];
+    const char *keys[MAX_KEYS];
     carom_joint_kind kind = CAROM_REVOLUTE;
     if (json_is_object(node->json) && !read_kind(problems, node, &kind)) return;
     const int has = keys_of(kind);
@@ -149,4 +184,6 @@ void crm_joint_read(crm_problems *problems, const crm_node *node, const crm_scen
     }
     if (has & AXIS) read_vector(problems, node, "axis", "a direction", &def->axis);
     if (has & LIMITS) read_limits(problems, node, def);
+    if (has & SPRING) read_spring(problems, node, def);
+    if (has & MOTOR) read_motor(problems, node, def);
 }

@@ -90,20 +90,26 @@ static int put_joints(const crm_scene *scene, carom_client_scene *out)
     return 1;
 }
 
-/* The messages know revolute joints without limits. */
+/* What the messages, which know pins, do not say of a joint; NULL: nothing. */
+static const char *untold(const carom_joint_def *j)
+{
+    if (j->kind != CAROM_REVOLUTE) return "";
+    if (j->lower > -HUGE_VAL || j->upper < HUGE_VAL) return " with limits";
+    if (j->stiffness > 0 || j->damping > 0) return " with a spring";
+    if (j->motor_limit > 0) return " with a motor";
+    return j->collide ? " between bodies that collide" : NULL;
+}
+
 int crm_scene_travels(const crm_scene *scene, char *why, size_t size)
 {
     why[0] = '\0';
     for (int k = 0; k < scene->n_joints; k++) {
         const carom_joint_def *j = &scene->joints[k];
-        const int limited = j->lower > -HUGE_VAL || j->upper < HUGE_VAL;
-        if (j->kind == CAROM_REVOLUTE && !limited && !j->collide) continue;
+        const char *what = untold(j);
+        if (!what) continue;
         snprintf(why, size,
                  "joints[%d]: a %s joint%s cannot be sent to a server yet; `carom run` takes it", k,
-                 carom_joint_kind_name(j->kind),
-                 j->kind != CAROM_REVOLUTE ? ""
-                 : limited                 ? " with limits"
-                                           : " between bodies that collide");
+                 carom_joint_kind_name(j->kind), what);
         return 0;
     }
     return 1;

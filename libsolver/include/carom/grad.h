@@ -60,6 +60,11 @@ typedef struct carom_gradient {
     double *lengths;      /* n_joints: held distance */
     double *lower;        /* n_joints: limits */
     double *upper;        /* n_joints */
+    double *stiffness;    /* n_joints: springs and motors, as in carom_joint_def */
+    double *damping;      /* n_joints */
+    double *rest;         /* n_joints */
+    double *motor_speed;  /* n_joints */
+    double *motor_limit;  /* n_joints */
 } carom_gradient;
 
 typedef struct carom_gradient_stats {

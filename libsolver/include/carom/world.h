@@ -124,7 +124,8 @@ typedef enum carom_joint_kind {
     CAROM_WELD,       /* a point and the turn of B against A */
     CAROM_WHEEL,      /* a point of B stays on a line of A */
     CAROM_DISTANCE,   /* the distance of two points: a rod */
-    CAROM_ROPE,       /* nothing; its limits bound the distance of two points */
+    CAROM_ROPE,       /* nothing; limits or a spring work on the distance of two points */
+    CAROM_TARGET,     /* nothing; a spring pulls a point of B to one of A */
     CAROM_LOCK_X,     /* x of a point of B against that of A, in the world's axes */
     CAROM_LOCK_Y,     /* y, likewise */
     CAROM_LOCK_ANGLE, /* the turn of B against A */
@@ -145,13 +146,20 @@ typedef struct carom_joint_def {
         lower; /* lower and upper limit of: the turn of B against A from now on [rad], revolute; */
     double upper; /* its way along the axis [m], prismatic and wheel; the distance [m], rope */
     double restitution; /* at the limits [1], 0 to 1 */
+    /* A spring on what the limits are about, and on both directions of a target. */
+    double stiffness;   /* [N/m], [N m/rad]; 0: none */
+    double damping;     /* [N s/m], [N m s/rad] */
+    double rest;        /* turn or way from now on, or distance, without force [rad, m] */
+    /* A motor on the turn of B (revolute, wheel) or its way along the axis (prismatic). */
+    double motor_speed; /* [rad/s], [m/s] */
+    double motor_limit; /* largest torque or force [N m, N]; 0: no motor */
     int collide;        /* 1: the two bodies may touch each other */
 } carom_joint_def;
 
-/* Bodies -1 (to be given), points at the origin, axis (1, 0), no limits, restitution 0; only bodies
- * joined by a distance, a rope or a lock collide. */
+/* Bodies -1 (to be given), points at the origin, axis (1, 0), no limits, spring or motor; only bodies
+ * joined by a distance, rope, target or lock collide. */
 CAROM_API carom_joint_def carom_joint_defaults(carom_joint_kind kind);
-/* "revolute", "prismatic", "weld", "wheel", "distance", "rope", "lock_x", "lock_y", "lock_angle";
+/* "revolute", "prismatic", "weld", "wheel", "distance", "rope", "target", "lock_x", "lock_y", "lock_angle";
  * NULL for any other number. */
 CAROM_API const char *carom_joint_kind_name(carom_joint_kind kind);
 /* Adds a joint; *index (may be NULL) is its number.  CAROM_E_ARGUMENT, CAROM_E_MEMORY;
@@ -196,6 +204,13 @@ CAROM_API carom_status carom_world_step(carom_world *world, const double *force,
 
 CAROM_API int carom_world_n_bodies(const carom_world *world);
 CAROM_API int carom_world_n_joints(const carom_world *world);
+/* What a joint, its limits and its motor do to body B, mean over the last sub-step; without its
+ * spring.  Zero before the first step. */
+typedef struct carom_joint_force {
+    carom_vec2 force; /* at the anchor of B, in the world's axes [N]; on A the opposite */
+    double torque;    /* about that anchor [N m] */
+} carom_joint_force;
+CAROM_API carom_joint_force carom_world_joint_force(const carom_world *world, int joint);
 /* Steps taken, and their time [s]. */
 CAROM_API long carom_world_steps(const carom_world *world);
 CAROM_API double carom_world_time(const carom_world *world);
