@@ -250,12 +250,39 @@ static void edge_lost_in_rounding(void **state)
     }
 }
 
+/* A disc ever farther along the line of a segment: no face separates but by rounding. */
+static void distant_in_line(void **state)
+{
+    (void)state;
+    const carom_shape disc = DISC(0.5);
+    const carom_shape bar = {0.25, 2, FROM_ORIGIN};
+    for (int k = 0; k < 400; k++) {
+        const double d = 5 * pow(10, 0.09 * k); /* to 4e36 */
+        const carom_pose o = {0.3 * k, 0, 0};
+        const carom_pose q = {k, d * cos(o.angle), d * sin(o.angle)};
+        const carom_manifold m[2] = {carom_collide(&bar, o, &disc, q, HUGE_VAL),
+                                     carom_collide(&disc, q, &bar, o, HUGE_VAL)};
+        for (int i = 0; i < 2; i++) {
+            const double tol = 16 * DBL_EPSILON * d;
+            assert_near_case("distance", k, m[i].distance, d - 4 - 0.75, tol);
+            assert_near_case("x", k, fabs(m[i].normal.x), fabs(cos(o.angle)), 1e-14);
+        }
+        const carom_frame fa = carom_frame_at(o);
+        const carom_frame fb = carom_frame_at(q);
+        carom_pair_cache cache = {0};
+        for (int i = 0; i < 3; i++) {
+            assert_int_equal(carom_collide_frames(&bar, &fa, &disc, &fb, 0.1, &cache).count, 0);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(named_cases),
         cmocka_unit_test(named_cases_swapped),
         cmocka_unit_test(edge_lost_in_rounding),
+        cmocka_unit_test(distant_in_line),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -198,8 +198,9 @@ static void same_sweep(crm_sweep_function *f, crm_sweep_function *g, const char 
 {
     crm_closest x;
     crm_closest y;
-    f(a, b, reach, 1, &x);
-    g(a, b, reach, 1, &y);
+    const crm_search how = {reach, 0.02, INT_MAX};
+    f(a, b, crm_tie(a, b), &how, &x);
+    g(a, b, crm_tie(a, b), &how, &y);
     expect_same(way, k, &x, &y);
     assert_true(x.lead == y.lead);
     if (x.kind == CRM_APART) return;

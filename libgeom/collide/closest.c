@@ -45,8 +45,7 @@ int crm_closest_from(const crm_placed *a, const crm_placed *b, crm_axis x, doubl
     const double h = crm_dot(x.d, crm_between(a, x.a, b, x.b));
     if (!(h > 0)) return 0;
     const double length = crm_length(x.d);
-    /* Clearly farther: what is just within reach is for the distance itself to decide. */
-    if (h > (reach + crm_tie(a, b)) * length) {
+    if (h > crm_beyond(reach, crm_tie(a, b)) * length) {
         out->kind = CRM_APART;
         out->a = x.a;
         out->b = x.b;
@@ -121,38 +120,44 @@ static void leave_face(const crm_placed *a, const crm_placed *b, double reach, c
 }
 
 #ifdef CRM_AVX2
-static void sweep_few(const crm_placed *a, const crm_placed *b, double reach, int want_lead,
+static void sweep_few(const crm_placed *a, const crm_placed *b, double tie, const crm_search *how,
                       crm_closest *out)
 {
     const int four = a->n <= 4 && b->n <= 4;
     if (__builtin_cpu_supports("avx2")) {
         if (four) {
-            crm_sweep_four_avx2(a, b, reach, want_lead, out);
+            crm_sweep_four_avx2(a, b, tie, how, out);
         } else {
-            crm_sweep_eight_avx2(a, b, reach, want_lead, out);
+            crm_sweep_eight_avx2(a, b, tie, how, out);
         }
     } else if (four) {
-        crm_sweep_four(a, b, reach, want_lead, out);
+        crm_sweep_four(a, b, tie, how, out);
     } else {
-        crm_sweep_eight(a, b, reach, want_lead, out);
+        crm_sweep_eight(a, b, tie, how, out);
     }
 }
 #else
-static void sweep_few(const crm_placed *a, const crm_placed *b, double reach, int want_lead,
+static void sweep_few(const crm_placed *a, const crm_placed *b, double tie, const crm_search *how,
                       crm_closest *out)
 {
     if (a->n <= 4 && b->n <= 4) {
-        crm_sweep_four(a, b, reach, want_lead, out);
+        crm_sweep_four(a, b, tie, how, out);
     } else {
-        crm_sweep_eight(a, b, reach, want_lead, out);
+        crm_sweep_eight(a, b, tie, how, out);
     }
 }
 #endif
 
+/* So far apart [coordinates of the cores] that heights over faces, products with the distance, are
+ * but rounding. */
+static const double DISTANT = 1e6;
+
 void crm_closest_features(const crm_placed *a, const crm_placed *b, const crm_search *how,
                           crm_closest *out)
 {
-    const int few = a->n <= CRM_FEW && b->n <= CRM_FEW;
+    const double coordinates = crm_coordinates(a, b);
+    const int distant = crm_spread(a, b) > DISTANT * coordinates;
+    const int few = a->n <= CRM_FEW && b->n <= CRM_FEW && !distant;
     const int n = a->n + b->n;
     crm_axis x;
     if (!few || n >= how->gjk_min_vertices) {
@@ -165,7 +170,7 @@ void crm_closest_features(const crm_placed *a, const crm_placed *b, const crm_se
         if (crm_gjk(a, b, x.d, &y) && crm_closest_from(a, b, y, how->reach, out)) return;
     }
     if (few) {
-        sweep_few(a, b, how->reach, how->slack > 0, out);
+        sweep_few(a, b, CRM_TIE_TOL * coordinates, how, out);
     } else {
         crm_sweep(a, b, &x, how->reach, how->slack, out);
     }

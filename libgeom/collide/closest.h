@@ -30,12 +30,24 @@ typedef struct crm_closest {
 /* Heights of faces that differ by less are tied [1], times the coordinates [m]. */
 #define CRM_TIE_TOL 1e-14
 
+/* ... and of the bodies' positions from each other [1], times that distance [m]: vertices at the
+ * bodies' origins have no coordinates, and yet are turned and subtracted. */
+#define CRM_FAR_TOL 2e-15
+
+/* From one body's position to the other's, summed over the axes [m]. */
+static inline double crm_spread(const crm_placed *a, const crm_placed *b)
+{
+    const carom_vec2 d = crm_sub(b->at, a->at);
+    return fabs(d.x) + fabs(d.y);
+}
+
 /* What rounding may add to a distance between these vertices. */
 static inline double crm_noise(const crm_placed *p, int i, const crm_placed *q, int j)
 {
     const carom_vec2 a = p->v[i];
     const carom_vec2 b = q->v[j];
-    return CRM_NEAR_TOL * (fabs(a.x) + fabs(a.y) + fabs(b.x) + fabs(b.y));
+    return CRM_NEAR_TOL * (fabs(a.x) + fabs(a.y) + fabs(b.x) + fabs(b.y)) +
+           CRM_FAR_TOL * crm_spread(p, q);
 }
 
 /* The size of a core's coordinates, by two vertices far from each other [m]. */
@@ -59,6 +71,12 @@ static inline double crm_coordinates(const crm_placed *a, const crm_placed *b)
 static inline double crm_tie(const crm_placed *a, const crm_placed *b)
 {
     return CRM_TIE_TOL * crm_coordinates(a, b);
+}
+
+/* What is clearly farther than reach: what is just within is for the distance itself to decide. */
+static inline double crm_beyond(double reach, double tie)
+{
+    return reach * (1 + 2 * CRM_FAR_TOL) + tie;
 }
 
 /* Edge `edge` of p, vertex j of q; on_b: p is B.  Not tied, no lead. */
@@ -144,16 +162,6 @@ int crm_walk(const crm_placed *a, const crm_placed *b, crm_axis from, crm_closes
 void crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, double reach,
                double slack, crm_closest *out);
 
-/* The same where neither core has more than four, or CRM_FEW, vertices; without a start; the lead
- * on request.  With AVX2 (CRM_AVX2: compiled in) they give the same bits. */
-enum { CRM_FEW = 8 };
-typedef void crm_sweep_function(const crm_placed *a, const crm_placed *b, double reach,
-                                int want_lead, crm_closest *out);
-crm_sweep_function crm_sweep_four;
-crm_sweep_function crm_sweep_eight;
-crm_sweep_function crm_sweep_four_avx2;
-crm_sweep_function crm_sweep_eight_avx2;
-
 /* libccd's GJK.  1: it says disjoint and *axis is its last direction with our support vertices, yet
  * to be certified by the caller. */
 int crm_gjk(const crm_placed *a, const crm_placed *b, carom_vec2 first, crm_axis *axis);
@@ -171,6 +179,17 @@ typedef struct crm_search {
     double slack;
     int gjk_min_vertices;
 } crm_search;
+
+/* The same where neither core has more than four, or CRM_FEW, vertices; without a start; the lead
+ * when there is a slack.  tie: crm_tie(a, b).  With AVX2 (CRM_AVX2: compiled in) they give the same
+ * bits. */
+enum { CRM_FEW = 8 };
+typedef void crm_sweep_function(const crm_placed *a, const crm_placed *b, double tie,
+                                const crm_search *how, crm_closest *out);
+crm_sweep_function crm_sweep_four;
+crm_sweep_function crm_sweep_eight;
+crm_sweep_function crm_sweep_four_avx2;
+crm_sweep_function crm_sweep_eight_avx2;
 
 void crm_closest_features(const crm_placed *a, const crm_placed *b, const crm_search *how,
                           crm_closest *out);

@@ -178,5 +178,5 @@ void crm_sweep(const crm_placed *a, const crm_placed *b, const crm_axis *x, doub
     crm_face_at(t.on_b ? b : a, t.edge, t.on_b ? a : b, t.vertex, t.on_b, out);
     out->tied = tied;
     out->lead = lead < t.slack ? lead : t.slack;
-    if (out->gap > reach + tie) out->kind = CRM_APART;
+    if (out->gap > crm_beyond(reach, tie)) out->kind = CRM_APART;
 }

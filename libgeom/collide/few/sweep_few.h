@@ -206,8 +206,8 @@ static int first_with_foot(int quads, const crm_placed *p, const crm_placed *q, 
 }
 
 /* For cores of at most 4 quads vertices, quads a constant. */
-static inline void sweep_few(int quads, const crm_placed *a, const crm_placed *b, double reach,
-                             int want_lead, crm_closest *out)
+static inline void sweep_few(int quads, const crm_placed *a, const crm_placed *b, double tie,
+                             const crm_search *how, crm_closest *out)
 {
     few at_a;
     few at_b;
@@ -217,9 +217,8 @@ static inline void sweep_few(int quads, const crm_placed *a, const crm_placed *b
     gather(b, quads, &at_b);
     turn(a, b, quads, &at_b);
     const carom_vec2 d = crm_turn_back(a, crm_sub(b->at, a->at));
-    /* Clearly farther: what is just within reach is for the distance itself to decide. */
-    const double tie = crm_tie(a, b);
-    const double far = (reach + tie) * (reach + tie);
+    const double beyond = crm_beyond(how->reach, tie);
+    const double far = beyond * beyond;
     const top top_a = see_faces(quads, &at_a, &at_b, d, &on_a);
     if (top_a.key > far) {
         apart_by(sqrt(top_a.key), out);
@@ -244,7 +243,7 @@ static inline void sweep_few(int quads, const crm_placed *a, const crm_placed *b
             first_with_foot(quads, b, a, &on_b, 1, least_key, out);
         }
         out->tied = 1;
-    } else if (want_lead) {
+    } else if (how->slack > 0) {
         out->lead = out->gap - height_of(second);
     }
 }

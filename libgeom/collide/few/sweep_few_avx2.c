@@ -1,14 +1,14 @@
 /* sweep_few_avx2.c: crm_sweep_four and crm_sweep_eight, compiled for machines with AVX2. */
 #include "collide/few/sweep_few.h"
 
-void crm_sweep_four_avx2(const crm_placed *a, const crm_placed *b, double reach, int want_lead,
-                         crm_closest *out)
+void crm_sweep_four_avx2(const crm_placed *a, const crm_placed *b, double tie,
+                         const crm_search *how, crm_closest *out)
 {
-    sweep_few(1, a, b, reach, want_lead, out);
+    sweep_few(1, a, b, tie, how, out);
 }
 
-void crm_sweep_eight_avx2(const crm_placed *a, const crm_placed *b, double reach, int want_lead,
-                          crm_closest *out)
+void crm_sweep_eight_avx2(const crm_placed *a, const crm_placed *b, double tie,
+                          const crm_search *how, crm_closest *out)
 {
-    sweep_few(2, a, b, reach, want_lead, out);
+    sweep_few(2, a, b, tie, how, out);
 }
