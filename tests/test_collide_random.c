@@ -28,7 +28,7 @@ typedef struct situation {
     double thin;    /* aspect ratio */
     double gap_low; /* of the shapes, log10 of its share of the size; 0: as it comes */
     double gap_high;
-    int lattice; /* small integer coordinates; 2: and right angles, rounded */
+    int lattice; /* small integer coordinates; 2: and right angles, rounded; 3: in line */
     int n_max;   /* vertices */
 } situation;
 
@@ -43,6 +43,7 @@ static const situation SITUATIONS[] = {
     {"finest needles", 1, 3, 1e-11, 0, 0, 0, 4},
     {"lattice", 1, 0, 1, 0, 0, 1, 4},
     {"lattice, turned", 1, 0, 1, 0, 0, 2, 4},
+    {"in line", 1, 0, 1, 0, 0, 3, 2},
     {"far", 1, 1e6, 0.2, 0, 0, 0, 16},
     {"small", 1e-6, 3e-6, 0.2, 0, 0, 0, 16},
     {"large", 1e6, 3e6, 0.2, 0, 0, 0, 16},
@@ -121,8 +122,33 @@ static void set_gap(rng *r, const situation *s, body *a, body *b)
     b->pose.y += move * (double)ref.ny;
 }
 
+/* Circles and segments, from their body's position on, along one line of any direction within
+ * rounding: end to end, apart up to 100, or over each other. */
+static void pair_in_line(rng *r, body *a, body *b)
+{
+    body *const of[2] = {a, b};
+    const double angle = rng_uniform(r, -4, 4);
+    for (int k = 0; k < 2; k++) {
+        body *s = of[k];
+        s->shape.vertices = s->vertices;
+        s->shape.count = 1 + rng_int(r, 2);
+        s->shape.radius = s->shape.count == 1 || rng_int(r, 2) ? rng_uniform(r, 0.1, 0.5) : 0;
+        s->vertices[0].x = s->vertices[0].y = s->vertices[1].y = 0;
+        s->vertices[1].x = rng_uniform(r, 0.5, 2) * (rng_int(r, 2) ? 1 : -1);
+        s->pose.angle = angle;
+        s->pose.x = s->pose.y = 0;
+    }
+    const double d = pow(10, rng_uniform(r, -1, 2));
+    b->pose.x = d * cos(angle);
+    b->pose.y = d * sin(angle);
+}
+
 static void random_pair(rng *r, const situation *s, body *a, body *b)
 {
+    if (s->lattice == 3) {
+        pair_in_line(r, a, b);
+        return;
+    }
     do random_body(r, s, a);
     while (carom_shape_check(&a->shape, NULL));
     do random_body(r, s, b);
