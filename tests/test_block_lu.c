@@ -88,7 +88,7 @@ static values room_for(const fixture *f, int island)
     const size_t nz = (size_t)s->lp[s->n];
     m.dense = calloc(9 * n * n + 1, sizeof(double));
     m.memory = calloc(18 * nz + 12 * n + 1, sizeof(double));
-    m.ints = calloc(6 * n + 1, sizeof(int));
+    m.ints = calloc(7 * n + 1, sizeof(int));
     assert_true(m.dense && m.memory && m.ints);
     m.lu = (crm_block_lu){.n = m.n,
                           .place = s->place + first,

@@ -37,7 +37,7 @@ static void layout(crm_arena *a, crm_system *y, const crm_graph *g, const crm_bl
     y->u = crm_arena_take(a, 9 * (size_t)nz, sizeof(double));
     y->d = crm_arena_take(a, 9 * (size_t)s->n, sizeof(double));
     y->pivot = crm_arena_ints(a, 2 * s->n);
-    y->lu_work = crm_arena_ints(a, 4 * s->n);
+    y->lu_work = crm_arena_ints(a, 5 * s->n);
     y->lu_x = crm_arena_doubles(a, 3 * s->n);
 }
 
@@ -223,7 +223,7 @@ static crm_block_lu lu_view(const crm_system *y, const crm_block_pattern *s, int
                           .u = y->u,
                           .d = y->d + 9 * (size_t)first,
                           .pivot = y->pivot + 2 * first,
-                          .work = y->lu_work + 4 * first,
+                          .work = y->lu_work + 5 * first,
                           .x = y->lu_x + 3 * first};
 }
 

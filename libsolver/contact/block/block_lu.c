@@ -117,6 +117,21 @@ static void scale_panels(const crm_block_lu *f, int j)
     }
 }
 
+/* c -= a b + p q. */
+static inline void subtract_two(double *restrict c, const double *restrict a,
+                                const double *restrict b, const double *restrict p,
+                                const double *restrict q)
+{
+    for (int r = 0; r < 3; r++) {
+        const double *x = a + 3 * r;
+        const double *y = p + 3 * r;
+        for (int k = 0; k < 3; k++) {
+            c[3 * r + k] -= (x[0] * b[k] + x[1] * b[3 + k] + x[2] * b[6 + k]) +
+                            (y[0] * q[k] + y[1] * q[3 + k] + y[2] * q[6 + k]);
+        }
+    }
+}
+
 /* Column and row j lose the product of column k of L and row k of U, from entry p on (row j). */
 static void apply_column(const crm_block_lu *f, int k, int p, int j, const int *at)
 {
@@ -130,37 +145,81 @@ static void apply_column(const crm_block_lu *f, int k, int p, int j, const int *
     }
 }
 
-/* Left-looking: the columns that still act on later ones hang in a list at their next row. */
+/* The same of columns k and k + 1, whose entries from p and p2 on have the same rows. */
+static void apply_two(const crm_block_lu *f, int k, int p, int p2, int j, const int *at)
+{
+    const double *l1 = f->l + 9 * (size_t)p;
+    const double *u1 = f->u + 9 * (size_t)p;
+    const double *l2 = f->l + 9 * (size_t)p2;
+    const double *u2 = f->u + 9 * (size_t)p2;
+    subtract_two(f->d + 9 * (size_t)j, l1, u1, l2, u2);
+    for (int q = 1; q < f->lp[k + 1] - p; q++) {
+        const size_t to = 9 * (size_t)at[f->li[p + q]];
+        const size_t skip = 9 * (size_t)q;
+        subtract_two(f->l + to, l1 + skip, u1, l2 + skip, u2);
+        subtract_two(f->u + to, l1, u1 + skip, l2, u2 + skip);
+    }
+}
+
+/* Columns first .. last of L share the rows of the last `n` entries of each; the one `t` behind the
+ * first of these is row j.  Column and row j lose their products. */
+static void apply_columns(const crm_block_lu *f, int first, int last, int n, int t, int j,
+                          const int *at)
+{
+    int k = first;
+    for (; k < last; k += 2) {
+        const int p = f->lp[k + 1] - n + t;
+        const int p2 = f->lp[k + 2] - n + t;
+        apply_two(f, k, p, p2, j, at);
+    }
+    if (k == last) apply_column(f, k, f->lp[k + 1] - n + t, j, at);
+}
+
+/* Column j has the rows of column j - 1 without j. */
+static int continues(const crm_block_lu *f, int j)
+{
+    return j > 0 && f->lp[j] - f->lp[j - 1] == f->lp[j + 1] - f->lp[j] + 1 &&
+           f->li[f->lp[j - 1]] == j;
+}
+
+/* Left-looking.  Columns with the same rows below them act together; they hang, by the last of
+ * them, in a list at the next row that they act on. */
 int crm_block_factor(crm_block_lu *f)
 {
     const int n = f->n;
     int *head = f->work;
     int *next = head + n;
-    int *front = next + n; /* next entry of each column to act */
+    int *front = next + n; /* next entry of the last column to act */
     int *at = front + n;   /* row -> entry of the current column */
+    int *first = at + n;   /* of the columns that hang by their last */
     int replaced = 0;
+    int start = 0; /* of the columns that go with the present one */
     for (int j = 0; j < n; j++) head[j] = -1;
     for (int j = 0; j < n; j++) {
+        const int size = f->lp[j + 1] - f->lp[j];
         for (int p = f->lp[j]; p < f->lp[j + 1]; p++) at[f->li[p]] = p;
         for (int k = head[j]; k >= 0;) {
             const int after = next[k];
-            const int p = front[k]++;
-            apply_column(f, k, p, j, at);
-            if (p + 1 < f->lp[k + 1]) {
-                const int i = f->li[p + 1];
+            const int t = front[k]++;
+            const int m = f->lp[k + 1] - f->lp[k];
+            apply_columns(f, first[k], k, m, t, j, at);
+            if (t + 1 < m) {
+                const int i = f->li[f->lp[k] + t + 1];
                 next[k] = head[i];
                 head[i] = k;
             }
             k = after;
         }
+        if (!continues(f, j)) start = j;
+        if (start < j) apply_columns(f, start, j - 1, size + 1, 0, j, at);
         replaced += factor_diagonal(f->d + 9 * (size_t)j, f->pivot + 2 * j);
         scale_panels(f, j);
-        front[j] = f->lp[j];
-        if (f->lp[j] < f->lp[j + 1]) {
-            const int i = f->li[f->lp[j]];
-            next[j] = head[i];
-            head[i] = j;
-        }
+        if (!size || (j + 1 < n && continues(f, j + 1))) continue;
+        const int i = f->li[f->lp[j]];
+        first[j] = start;
+        front[j] = 0;
+        next[j] = head[i];
+        head[i] = j;
     }
     return replaced;
 }

@@ -53,7 +53,7 @@ typedef struct crm_block_lu {
     double *u;
     double *d;  /* 9 n */
     int *pivot; /* 2 n */
-    int *work;  /* 4 n */
+    int *work;  /* 5 n */
     double *x;  /* 3 n */
 } crm_block_lu;
 
