@@ -196,6 +196,80 @@ static void orders_are_what_they_say(void **state)
     }
 }
 
+/* A thin ladder slides down a smooth wall and leaves it. */
+static int ladder(carom_world *w)
+{
+    const carom_vec2 wall[4] = {{-1, -5}, {0, -5}, {0, 5}, {-1, 5}};
+    const carom_shape shape = {0, 4, wall};
+    const double a = 0.5;
+    const double c = 1e-3;
+    carom_body_def d = carom_body_defaults();
+    d.type = CAROM_STATIC;
+    d.shapes = &shape;
+    d.n_shapes = 1;
+    d.friction = 0;
+    assert_int_equal(carom_world_add_body(w, &d, NULL), CAROM_OK);
+    scene_floor(w, 0, 0);
+    /* its lowest corner on the floor, its leftmost on the wall */
+    const carom_pose pose = {a, c * cos(a) + sin(a), c * sin(a) + cos(a)};
+    return scene_box(w, 1, c, 1, pose, 0, 0);
+}
+
+/* A disc rolls off a disc: it sticks, begins to slip, and leaves. */
+static int roll_off(carom_world *w)
+{
+    const carom_vec2 center = {0, 0};
+    const carom_shape round = {1, 1, &center};
+    carom_body_def d = carom_body_defaults();
+    d.type = CAROM_STATIC;
+    d.shapes = &round;
+    d.n_shapes = 1;
+    d.friction = 0.9;
+    assert_int_equal(carom_world_add_body(w, &d, NULL), CAROM_OK);
+    return scene_disc(w, 1, 0.3, 1.3 * sin(0.3), 1.3 * cos(0.3), 0.9, 0);
+}
+
+static void after_one_second(int (*build)(carom_world *), int order, int n, double *q)
+{
+    scene_order = order;
+    carom_world *w = scene_world(9.81, 1.0 / n);
+    scene_order = 2;
+    const int b = build(w);
+    scene_run(w, n, NULL);
+    for (int k = 0; k < 3; k++) q[k] = q_of(w, b)[k];
+    carom_world_destroy(w);
+}
+
+/* Changes of mode are located, so the order holds through them.  Reference: order 8 with sixteen
+ * times as many steps; both coarse errors are well above 1e-12, its rounding. */
+static void orders_hold_through_changes(void **state)
+{
+    (void)state;
+    int (*const builds[2])(carom_world *) = {ladder, roll_off};
+    static const int coarse[2][2] = {{30, 15}, {60, 60}};
+    for (int scene = 0; scene < 2; scene++) {
+        double exact[3];
+        after_one_second(builds[scene], 8, 480, exact);
+        for (int order = 4; order <= 6 - 2 * scene; order += 2) {
+            const int n = coarse[scene][order / 2 - 2];
+            double error[2] = {0, 0};
+            for (int i = 0; i < 2; i++) {
+                double q[3];
+                after_one_second(builds[scene], order, n << i, q);
+                for (int k = 0; k < 3; k++) error[i] = fmax(error[i], fabs(q[k] - exact[k]));
+            }
+            const double observed = log2(error[0] / error[1]);
+            if (fabs(observed - order) > 0.4) {
+                fail_msg("scene %d, order %d: errors %g and %g, observed order %g", scene, order,
+                         error[0], error[1], observed);
+            }
+        }
+        double q[3];
+        after_one_second(builds[scene], 8, 30, q);
+        for (int k = 0; k < 3; k++) assert_near(q[k], exact[k], 1e-11);
+    }
+}
+
 /* The estimate is that of the order below: above the error, and going to zero with its order. */
 static void estimate_is_above_the_error(void **state)
 {
@@ -271,6 +345,7 @@ int main(void)
         cmocka_unit_test(bouncing_ball),
         cmocka_unit_test(elastic_energy),
         cmocka_unit_test(orders_are_what_they_say),
+        cmocka_unit_test(orders_hold_through_changes),
         cmocka_unit_test(estimate_is_above_the_error),
         cmocka_unit_test(slide_to_roll),
         cmocka_unit_test(sliding_box_turns_back),

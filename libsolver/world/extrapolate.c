@@ -263,7 +263,8 @@ carom_status crm_extrapolate(carom_world *w, double h)
     s->map = CRM_MAP_EXTRAPOLATED;
     s->n_inner = n_inner;
     show(w, columns);
-    if (!one_mode(w, n_inner)) {
+    s->finest = !one_mode(w, n_inner);
+    if (s->finest) {
         take_finest(w, columns);
         return worst;
     }

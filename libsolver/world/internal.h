@@ -167,6 +167,7 @@ typedef struct crm_substep {
     int n_inner;             /* of an extrapolated map: its smooth sub-steps */
     double weight[CRM_MAX_COLUMNS]; /* ... of its columns */
     double estimate;                /* of its error [m] */
+    int finest;                     /* 1: modes change within it, the finest column alone counts */
     int n_solves;
     crm_solve solve[CRM_MAX_SOLVES];
     crm_end end;
@@ -304,6 +305,7 @@ struct carom_world {
     double *carry; /* per body: time owed to the next step, 0 but for rounding and derivative */
     unsigned char *owes; /* per body: the last step ended with an event */
     double *carry_saved;
+    double *probe; /* 3 n_bodies: a pose near another one; order > 2 */
     unsigned char *owes_saved;
     int statics_placed;       /* 1: the states of sub hold the static bodies */
     crm_islands islands;      /* of the frame under way */
@@ -599,6 +601,9 @@ carom_status crm_find_root(carom_world *w, const crm_indicator *f, double *h);
 carom_status crm_locate_stop(carom_world *w);
 /* Jt v of a contact at the pose it was evaluated at. */
 double crm_slip_speed(const crm_contact *c, const double *v);
+
+/* change.c: when a contact of an extrapolated sub-step opens or begins to slip, it ends there. */
+carom_status crm_locate_change(carom_world *w, double left);
 
 /* locate.c: S(left), or S of a fraction of it when that has no solution, or the Euler map. */
 carom_status crm_run_through(carom_world *w, double left);

@@ -416,11 +416,12 @@ carom_status crm_stop_passing(carom_world *w, double left)
     return CAROM_OK;
 }
 
-/* The sub-step as it is, or up to where the first slipping contact stops. */
-static carom_status stopped(carom_world *w, carom_status e)
+/* The sub-step as it is, or up to where the first slipping contact stops, or a mode changes. */
+static carom_status stopped(carom_world *w, double left, carom_status e)
 {
     if (e < 0 || !w->smooth) return e;
-    const carom_status s = crm_locate_stop(w);
+    carom_status s = crm_locate_stop(w);
+    if (s >= 0) s = crm_locate_change(w, left);
     return s < 0 || s > e ? s : e;
 }
 
@@ -433,17 +434,17 @@ carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
         watch x;
         int any;
         first_closed(w, &x, &any);
-        if (!any) return stopped(w, e);
+        if (!any) return stopped(w, left, e);
         *busy = any > allowed;
         if (*busy) return CAROM_OK;
         if (x.touches) {
             set_event(w, &x);
-            return stopped(w, e);
+            return stopped(w, left, e);
         }
         const double h = s->h * x.at;
         e = go_to_event(w, x, left);
         *busy = e >= 0 && s->h < NO_TIME * w->settings.dt;
-        if (!unsolved(e)) return *busy ? e : stopped(w, e);
+        if (!unsolved(e)) return *busy ? e : stopped(w, left, e);
         e = halve(w, h, left, e);
     }
     return e;

@@ -181,6 +181,7 @@ static void place_statics(carom_world *w)
     memcpy(w->sub.q1, w->q, bytes);
     for (int k = 0; k < CRM_MAX_SOLVES; k++) memcpy(w->sub.solve[k].q, w->q, bytes);
     for (int i = 0; i < CRM_MAX_INNER && w->inner[i].q0; i++) {
+        memcpy(w->probe, w->q, bytes);
         memcpy(w->inner[i].q0, w->q, bytes);
         memcpy(w->inner[i].q1, w->q, bytes);
         for (int k = 0; k < CRM_MAX_SOLVES; k++) memcpy(w->inner[i].solve[k].q, w->q, bytes);
