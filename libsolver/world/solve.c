@@ -34,6 +34,7 @@ static void add_stats(carom_world *w, const carom_contact_stats *c)
     s->factorizations += c->factorizations;
     s->iterations += c->iterations;
     if (c->stage > s->stage) s->stage = c->stage;
+    if (c->blocks > 0) w->factor_blocks = c->blocks;
 }
 
 static void take_velocities(const carom_world *w, const double *v, double *to)
