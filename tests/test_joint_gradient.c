@@ -270,6 +270,14 @@ static void located(void **state)
     check_scene(*state);
 }
 
+static void fourth_order(void **state)
+{
+    scene_integrator = CAROM_LOCATED;
+    scene_order = 4;
+    check_scene(*state);
+    scene_order = 2;
+}
+
 /* A disc that hangs still on a rod of length l: y = (anchor of the world) - l - (anchor of the
  * disc). */
 static void closed_forms(void **state)
@@ -306,14 +314,15 @@ static void closed_forms(void **state)
 
 int main(void)
 {
-    struct CMUnitTest tests[2 * N_SCENES + 1];
+    static void (*const maps[3])(void **) = {euler, located, fourth_order};
+    struct CMUnitTest tests[3 * N_SCENES + 1];
     memset(tests, 0, sizeof tests);
-    for (int k = 0; k < 2 * N_SCENES; k++) {
-        tests[k].name = SCENES[k / 2].name;
-        tests[k].test_func = k % 2 ? located : euler;
-        tests[k].initial_state = (void *)(size_t)&SCENES[k / 2];
+    for (int k = 0; k < 3 * N_SCENES; k++) {
+        tests[k].name = SCENES[k / 3].name;
+        tests[k].test_func = maps[k % 3];
+        tests[k].initial_state = (void *)(size_t)&SCENES[k / 3];
     }
     const struct CMUnitTest closed = cmocka_unit_test(closed_forms);
-    tests[2 * N_SCENES] = closed;
+    tests[3 * N_SCENES] = closed;
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

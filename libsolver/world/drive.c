@@ -197,6 +197,25 @@ static unsigned char settled(const crm_substep *s, const crm_solve *c, const crm
     }
 }
 
+int crm_motors_stall(const carom_world *w, const crm_substep *s, crm_solve *c)
+{
+    int changes = 0;
+    int first = 0;
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        const int row = first + j->n_held;
+        first += j->n_rows;
+        if (j->n_rows == j->n_held || c->motor[row] != CRM_MOTOR_HOLDS) continue;
+        double je[6];
+        crm_measure_at(j, crm_motor_measure(j->kind), c->q, je);
+        const double lacks = crm_motor_speed(j) - crm_row_dot(je, s->v0, j->body_a, j->body_b);
+        c->motor[row] = lacks < 0 ? CRM_MOTOR_MINUS : CRM_MOTOR_PLUS;
+        c->ce[row] = 0;
+        changes++;
+    }
+    return changes;
+}
+
 int crm_motors_settle(carom_world *w, const crm_substep *s, crm_solve *c)
 {
     int changes = 0;

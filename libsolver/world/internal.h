@@ -505,6 +505,8 @@ void crm_springs(carom_world *w, const crm_substep *s, const crm_solve *c);
 double crm_motor_impulse(const crm_substep *s, const crm_solve *c, const crm_joint *j, int row);
 /* Rows and given impulses of motors as c->motor says. */
 void crm_motors(carom_world *w, const crm_substep *s, const crm_solve *c);
+/* Motors that hold, where that has no solution, push toward their speeds.  Returns their number. */
+int crm_motors_stall(const carom_world *w, const crm_substep *s, crm_solve *c);
 /* After a solve: motors beyond their limit stop at it, and those at it that need less hold again.
  * Returns the number of changes. */
 int crm_motors_settle(carom_world *w, const crm_substep *s, crm_solve *c);

@@ -83,6 +83,12 @@ carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use
 {
     carom_status e = run_once(w, s, c, use_guess);
     if (!w->island->n_driven || !(crm_share(c) > 0)) return e;
+    if ((e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION) && crm_motors_stall(w, s, c)) {
+        crm_solve_velocity(w, s, c);
+        e = run_once(w, s, c, 0);
+        if (e >= 0) take_motors(w, s, c);
+        return e;
+    }
     for (int k = 0; e >= 0 && crm_motors_settle(w, s, c); k++) {
         if (k == MAX_SETTLINGS) return CAROM_E_NO_SOLUTION;
         crm_solve_velocity(w, s, c);
