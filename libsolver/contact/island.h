@@ -86,6 +86,7 @@ typedef struct crm_island {
     double inexact; /* a point this good ends the restarts early */
     int max_iterations;
     int max_restarts;
+    int brief; /* 1: no more than one interior point */
     int factorizations;
     int iterations;
 } crm_island;

@@ -87,8 +87,10 @@ static void solve_island(job *j, int island)
     s.inexact = c->settings.inexact;
     s.max_iterations = c->settings.max_iterations;
     s.max_restarts = c->settings.max_restarts;
-    if (j->use_guess) crm_system_read(&c->system, g, &s, island, j->x, j->use_guess);
-    o->status = crm_ladder_climb(&s, j->use_guess, &o->stage, &o->unpolished);
+    s.brief = j->use_guess & CAROM_GUESS_BRIEF;
+    const int guess = j->use_guess & ~CAROM_GUESS_BRIEF;
+    if (guess) crm_system_read(&c->system, g, &s, island, j->x, guess);
+    o->status = crm_ladder_climb(&s, guess, &o->stage, &o->unpolished);
     o->factorizations = s.factorizations;
     o->iterations = s.iterations;
     o->blocks = s.factorizations ? 2 * (s.lu.lp[s.lu.n] - s.lu.lp[0]) + s.lu.n : 0;

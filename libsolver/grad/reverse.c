@@ -152,7 +152,7 @@ static void friction_vjp(crm_reverse *r, const crm_solve *c, int k, const crm_co
 void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, const double *gap_bar,
                   const double *error_bar, double *q_bar, int with_parameters)
 {
-    const int rough = c->kind != CRM_CORRECTION;
+    const int rough = c->kind != CRM_CORRECTION && !s->slick;
     for (int k = 0; k < s->n_contacts; k++) {
         carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, gap_bar ? gap_bar[k] : 0};
         const double *jt_bar = rough ? &r->bars.jt[6 * k] : NULL;

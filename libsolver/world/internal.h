@@ -7,6 +7,7 @@
 #include "carom/collide.h"
 #include "carom/events.h"
 #include "carom/world.h"
+#include "world/anderson.h"
 
 #include <math.h>
 
@@ -17,6 +18,11 @@
 #define CRM_MAX_SOLVES (2 + CRM_MAX_CORRECTIONS)
 /* A pair whose gap is below this touches [L]. */
 #define CRM_HIT_TOL 1e-12
+/* An event sooner than that [dt] is none: what it waits for was so at the start. */
+#define CRM_NO_TIME 1e-13
+/* Factorizations of an island in a frame from which on a solve is left early where another map or a
+ * shorter sub-step may do, and from which on the rest of the frame is one Euler sub-step. */
+enum { CRM_BRIEF = 1000, CRM_WORN = 5000 };
 /* Approach below this is rest [fastest point of the world]. */
 #define CRM_REST_TOL 1e-9
 
@@ -163,6 +169,8 @@ typedef struct crm_substep {
     double *target;          /* per contact: gap that stage 1 aims at [m] */
     double *joint_target;    /* per joint row: error that stage 1 aims at [m] */
     double restitution;      /* factor on all restitutions: 1, or 0 when relaxed */
+    int slick;               /* 1: without friction, where that left no solution */
+    carom_status met;        /* of the map, when it was last run */
     int ahead;               /* 1: contacts are all that may close; impacts are not located */
     int n_inner;             /* of an extrapolated map: its smooth sub-steps */
     double weight[CRM_MAX_COLUMNS]; /* ... of its columns */
@@ -185,6 +193,8 @@ typedef struct crm_rows {
     int *contact_body;
     double *jn, *jt, *mu;
     double *zero; /* max_contacts zeros: friction of corrections */
+    double *yn;   /* per contact, and ye per joint row: why a problem is infeasible */
+    double *ye;
     int *joint_body;
     double *je;
     double *error;    /* per joint row: position error at the pose of the rows [m] */
@@ -302,6 +312,7 @@ struct carom_world {
     crm_substep sub;
     crm_substep inner[CRM_MAX_INNER]; /* of an extrapolated map; made when order > 2 */
     double *q_saved, *v_saved;        /* 3 n_bodies: for a failed step */
+    crm_anderson anderson;            /* of stage 1 and of its adjoint */
     double *carry; /* per body: time owed to the next step, 0 but for rounding and derivative */
     unsigned char *owes; /* per body: the last step ended with an event */
     double *carry_saved;
@@ -312,6 +323,7 @@ struct carom_world {
     const crm_island *island; /* under way */
     int n_substeps;           /* of the island in this frame */
     int n_impacts;            /* of the island since time last passed */
+    int effort;               /* factorizations of the island in this frame */
     crm_touches touches, next;
     int first_touch;        /* of the island, in next */
     double *joint_force[2]; /* per joint row: as crm_touch.force_n [N] */
@@ -528,8 +540,10 @@ void crm_rows_free(carom_world *w);
 /* solve.c */
 /* Solves c, whose right-hand sides and pose are set; the result and modes go to c. */
 carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use_guess);
-/* The same for a problem with restitution; where that leaves no solution, without. */
-carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, const double *v);
+/* The same for a problem with restitution, unless plastic; where that leaves no solution, without,
+ * then without friction, then with as much approach as must be. */
+carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, const double *v,
+                              int plastic);
 /* q += scale v for moving bodies. */
 void crm_move(const carom_world *w, double *q, const double *v, double scale);
 /* Rounding error of a position difference, from the farthest body [m]. */
@@ -558,7 +572,7 @@ carom_status crm_euler(carom_world *w, double h);  /* euler.c */
 carom_status crm_smooth(carom_world *w, double h); /* smooth.c */
 /* smooth.c; plastic: without restitution, CAROM_LIMIT. */
 carom_status crm_impact(carom_world *w, int plastic);
-/* euler.c or smooth.c, as sealed. */
+/* The map of the sub-step under way, sub.map, over h; sub.met is its status. */
 carom_status crm_map_run(carom_world *w, double h);
 /* Corrects sub.q1 until no contact of sub overlaps and no joint drifts; the corrections are solves
  * `first` and on.  CAROM_LIMIT when something is left. */

@@ -6,8 +6,6 @@
 
 /* The root of a gap is found to this [L]; rounding of far coordinates is added. */
 static const double ROOT_TOL = 1e-13;
-/* An event sooner than that [dt] is none: the gap was closed at the start and nobody knew. */
-static const double NO_TIME = 1e-13;
 /* Overlap that counts as passing through [thickness of both]. */
 static const double DEEP = 0.1;
 /* Illinois steps for one root, rounds over several roots, halvings of a failed sub-step. */
@@ -264,6 +262,7 @@ carom_status crm_find_root(carom_world *w, const crm_indicator *f, double *h)
         const carom_status e = crm_map_run(w, t);
         if (e < 0) return e;
         *h = t;
+        if (t < CRM_NO_TIME * w->settings.dt) return CAROM_OK;
         const double g = f->value(w, f->what, t);
         if (fabs(g) <= f->tol || b - a <= 1e-16 * b) return CAROM_OK;
         if (g > 0) {
@@ -346,7 +345,7 @@ static carom_status go_to_event(carom_world *w, watch x, double left)
         h *= next.at;
     }
     if (!set_event(w, &x)) end_at_fraction(s, left);
-    return CAROM_OK;
+    return s->met;
 }
 
 static int unsolved(carom_status e)
@@ -367,20 +366,33 @@ static carom_status halve(carom_world *w, double h, double left, carom_status fa
 }
 
 /* Where the smooth map has no solution at any length that was tried, the Euler map may have one. */
-static carom_status run_euler(carom_world *w, double left, carom_status failed)
+static carom_status run_euler(carom_world *w, double h, double left, carom_status failed)
 {
-    if (!w->smooth) return failed;
-    w->sub.end = CRM_END_FRAME;
-    const carom_status e = crm_euler(w, left);
-    return e < 0 ? failed : e < CAROM_LIMIT ? CAROM_LIMIT : e;
+    if (w->sub.map == CRM_MAP_EULER) return failed;
+    w->sub.map = CRM_MAP_EULER;
+    const carom_status e = crm_map_run(w, h);
+    if (w->sub.end == CRM_END_FRACTION) w->sub.fraction = h / left;
+    return unsolved(e) ? halve(w, h, left, e) : e;
+}
+
+/* A sub-step of length h without a solution: shorter, or by the Euler map. */
+static carom_status rescue(carom_world *w, double h, double left, carom_status failed)
+{
+    const carom_status e = halve(w, h, left, failed);
+    if (!unsolved(e)) return e;
+    end_at_fraction(&w->sub, left);
+    return run_euler(w, h, left, e);
 }
 
 carom_status crm_run_through(carom_world *w, double left)
 {
     w->sub.end = CRM_END_FRAME;
+    w->sub.map = w->smooth && w->effort < CRM_WORN ? CRM_MAP_SMOOTH : CRM_MAP_EULER;
     carom_status e = crm_map_run(w, left);
     if (unsolved(e)) e = halve(w, left, left, e);
-    return unsolved(e) ? run_euler(w, left, e) : e;
+    if (!unsolved(e)) return e;
+    w->sub.end = CRM_END_FRAME;
+    return run_euler(w, left, left, e);
 }
 
 /* Of a pair that moves by more than its thickness: whether it overlaps by a part of that on its
@@ -410,16 +422,17 @@ carom_status crm_stop_passing(carom_world *w, double left)
     }
     if (first.at > 1) return CAROM_OK;
     double h = w->sub.h * first.at;
-    carom_status e = find_root(w, &first, &h);
+    const carom_status e = find_root(w, &first, &h);
+    if (unsolved(e)) return rescue(w, h, left, e);
     if (e < 0) return e;
     if (!set_event(w, &first)) end_at_fraction(&w->sub, left);
-    return CAROM_OK;
+    return w->sub.met;
 }
 
 /* The sub-step as it is, or up to where the first slipping contact stops, or a mode changes. */
 static carom_status stopped(carom_world *w, double left, carom_status e)
 {
-    if (e < 0 || !w->smooth) return e;
+    if (e < 0 || !w->smooth || w->effort >= CRM_BRIEF) return e;
     carom_status s = crm_locate_stop(w);
     if (s >= 0) s = crm_locate_change(w, left);
     return s < 0 || s > e ? s : e;
@@ -434,18 +447,22 @@ carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
         watch x;
         int any;
         first_closed(w, &x, &any);
-        if (!any) return stopped(w, left, e);
         *busy = any > allowed;
         if (*busy) return CAROM_OK;
-        if (x.touches) {
+        double h = s->h;
+        if (any && x.touches) {
             set_event(w, &x);
-            return stopped(w, left, e);
+        } else if (any) {
+            h *= x.at;
+            e = go_to_event(w, x, left);
+            *busy = e >= 0 && s->h < CRM_NO_TIME * w->settings.dt;
         }
-        const double h = s->h * x.at;
-        e = go_to_event(w, x, left);
-        *busy = e >= 0 && s->h < NO_TIME * w->settings.dt;
-        if (!unsolved(e)) return *busy ? e : stopped(w, left, e);
-        e = halve(w, h, left, e);
+        if (e >= 0 && !*busy) {
+            h = s->h;
+            e = stopped(w, left, e);
+        }
+        if (!unsolved(e)) return e;
+        e = rescue(w, h, left, e);
     }
     return e;
 }

@@ -145,7 +145,7 @@ carom_contact_problem crm_problem(carom_world *w, const crm_substep *s, const cr
     p.contact_body = r->contact_body;
     p.jn = r->jn;
     p.jt = r->jt;
-    p.mu = c->kind == CRM_CORRECTION ? r->zero : r->mu;
+    p.mu = c->kind == CRM_CORRECTION || s->slick ? r->zero : r->mu;
     p.cn = c->cn;
     p.ct = c->ct;
     p.joint_body = r->joint_body;

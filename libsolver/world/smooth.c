@@ -6,11 +6,12 @@
 
 /* Newton's method ends when no right-hand side moves a position by more than this [L]. */
 static const double NEWTON_TOL = 1e-14;
-/* It converges linearly, by the turn of a body per sub-step; 30 allow for a turn of a third. */
-enum { MAX_NEWTON = 30 };
-/* Where it has not converged to within LOOSE of that, or a position is thrown farther than FAR [L],
- * the sub-step is too long: there is no solution at this h. */
-static const double LOOSE = 1e3;
+/* It converges linearly, by the turn of a body per sub-step times the mass ratio of neighbors, and
+ * is accelerated.  After PATIENT iterations less is asked, LOOSE [L], and said; where that is not
+ * met either, where MAX_VAIN iterations were none better, or a position is thrown farther than FAR
+ * [L], the sub-step is too long: there is no solution at this h. */
+enum { PATIENT = 25, MAX_NEWTON = 40, MAX_VAIN = 10 };
+static const double LOOSE = 1e-9;
 static const double FAR = 1e2;
 /* Speeds beyond this are no error of second order but another solution [what forces can give]. */
 static const double GAIN = 1.5;
@@ -122,20 +123,74 @@ static void end_pose(const carom_world *w, crm_substep *s, const crm_solve *c)
     crm_move(w, s->q1, c->v, s->h);
 }
 
-static void take_sides(const carom_world *w, const crm_substep *s, const crm_solve *from,
-                       crm_solve *to)
+/* Lengths that the iteration works on: right-hand sides of the rows that hold, times h; 0 for the
+ * others.  Rows of zeros, of motors at their limits, ask for exactly 0. */
+static void pack_sides(const carom_world *w, const crm_substep *s, const crm_solve *c,
+                       const crm_solve *asked, double *x)
 {
-    for (int k = 0; k < s->n_contacts; k++) {
-        to->cn[k] = from->cn[k];
-        to->ct[k] = from->ct[k];
+    const int n = s->n_contacts;
+    for (int k = 0; k < n; k++) {
+        x[k] = asked->mode[k] == CAROM_SEPARATED ? 0 : s->h * c->cn[k];
+        x[n + k] = asked->mode[k] == CAROM_STICK ? s->h * c->ct[k] : 0;
     }
-    for (int k = 0; k < w->island->n_rows; k++) to->ce[k] = from->ce[k];
+    for (int k = 0; k < w->island->n_rows; k++) {
+        x[2 * n + k] = asked->ce[k] == 0 ? 0 : s->h * c->ce[k];
+    }
+}
+
+/* Right-hand sides of the next iteration: those of `from`, and of the rows that hold `x`. */
+static void take_sides(const carom_world *w, const crm_substep *s, const crm_solve *from,
+                       const double *x, crm_solve *to)
+{
+    const int n = s->n_contacts;
+    for (int k = 0; k < n; k++) {
+        to->cn[k] = to->mode[k] == CAROM_SEPARATED ? from->cn[k] : x[k] / s->h;
+        to->ct[k] = to->mode[k] == CAROM_STICK ? x[n + k] / s->h : from->ct[k];
+    }
+    for (int k = 0; k < w->island->n_rows; k++) {
+        to->ce[k] = from->ce[k] == 0 ? 0 : x[2 * n + k] / s->h;
+    }
+}
+
+/* From the sides of c and those that its end pose asks for to those of the next iteration. */
+static void next_iterate(carom_world *w, const crm_substep *s, crm_solve *c, crm_solve *asked)
+{
+    crm_anderson *a = &w->anderson;
+    const size_t n = (size_t)s->n_contacts;
+    if (memcmp(asked->mode, c->mode, n) != 0) crm_anderson_forget(a);
+    memcpy(asked->mode, c->mode, n);
+    pack_sides(w, s, c, asked, a->point);
+    pack_sides(w, s, asked, asked, a->value);
+    crm_anderson_next(a);
+    take_sides(w, s, asked, a->point, c);
+}
+
+/* The iteration of stage 1, rows and first right-hand sides in place. */
+static carom_status iterate(carom_world *w, crm_substep *s, crm_solve *c)
+{
+    const double tol = NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
+    double best = HUGE_VAL;
+    int vain = 0;
+    for (int k = 0; k < MAX_NEWTON && vain <= MAX_VAIN; k++) {
+        const carom_status e = crm_solve_run(w, s, c, 1);
+        if (e < 0) return e;
+        end_pose(w, s, c);
+        if (!s->n_contacts && !w->island->n_rows) return CAROM_OK;
+        const double moved = next_sides(w, s, c, &s->solve[1]);
+        if (moved <= tol) return CAROM_OK;
+        if (k >= PATIENT && moved <= LOOSE * w->length) return CAROM_INEXACT;
+        if (!(moved < FAR * w->length)) return CAROM_E_NO_SOLUTION;
+        vain = moved < best ? 0 : vain + 1;
+        best = fmin(best, moved);
+        next_iterate(w, s, c, &s->solve[1]);
+    }
+    return CAROM_E_NO_SOLUTION;
 }
 
 /* Stage 1: M vh = M v0 + h/2 f + J0' l with gaps, slips and joints met at q1 = q0 + h vh. */
 static carom_status stage_1(carom_world *w, crm_substep *s)
 {
-    const double tol = NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
+    const int n = 2 * s->n_contacts + w->island->n_rows;
     crm_solve *c = &s->solve[0];
     c->kind = CRM_STAGE_1;
     crm_copy(w, c->q, s->q0);
@@ -143,18 +198,8 @@ static carom_status stage_1(carom_world *w, crm_substep *s)
     crm_solve_start(w, s, c);
     set_targets(w, s);
     first_sides(w, s, c);
-    double moved = 0;
-    for (int k = 0; k < MAX_NEWTON; k++) {
-        const carom_status e = crm_solve_run(w, s, c, 1);
-        if (e < 0) return e;
-        end_pose(w, s, c);
-        if (!s->n_contacts && !w->island->n_rows) return CAROM_OK;
-        moved = next_sides(w, s, c, &s->solve[1]);
-        if (moved <= tol) return CAROM_OK;
-        if (!(moved < FAR * w->length)) return CAROM_E_NO_SOLUTION;
-        take_sides(w, s, &s->solve[1], c);
-    }
-    return moved <= LOOSE * tol ? CAROM_OK : CAROM_E_NO_SOLUTION;
+    const carom_status e = crm_anderson_start(&w->memory, &w->anderson, n);
+    return e < 0 ? e : iterate(w, s, c);
 }
 
 /* Stage 2 at q1: M v1 = M vh + h/2 f + J1' l with the contacts still closed and the joints at rest;
@@ -301,21 +346,28 @@ static carom_status bounce(carom_world *w, crm_substep *s, int *done)
     return e;
 }
 
+static carom_status worse(carom_status a, carom_status b)
+{
+    return a > b ? a : b;
+}
+
 carom_status crm_smooth(carom_world *w, double h)
 {
     crm_substep *s = &w->sub;
     s->map = CRM_MAP_SMOOTH;
     s->h = h;
     s->restitution = 1;
+    s->slick = 0;
     int done = 0;
-    carom_status e = stage_1(w, s);
-    if (e < 0) return e;
+    const carom_status met = stage_1(w, s);
+    if (met < 0) return met;
     const carom_status cleared = clear_errors(w, s);
     if (cleared < 0) return cleared;
+    carom_status e = CAROM_OK;
     if (s->ahead) e = bounce(w, s, &done);
     if (e >= 0 && !done) e = stage_2(w, s);
     if (e >= 0 && !done && gains_energy(w, s, s->v1)) return CAROM_E_NO_SOLUTION;
-    return e < 0 || e > cleared ? e : cleared;
+    return e < 0 ? e : worse(e, worse(met, cleared));
 }
 
 carom_status crm_impact(carom_world *w, int plastic)
@@ -330,19 +382,11 @@ carom_status crm_impact(carom_world *w, int plastic)
     crm_copy(w, c->q, s->q0);
     crm_rows_at(w, s, s->q0);
     crm_solve_start(w, s, c);
-    carom_status e;
-    if (plastic) {
-        s->restitution = 0;
-        crm_velocity_targets(w, s, s->v0, c);
-        e = crm_solve_run(w, s, c, 1);
-        if (e >= 0 && e < CAROM_LIMIT) e = CAROM_LIMIT;
-    } else {
-        e = crm_solve_bounce(w, s, c, s->v0);
-    }
+    const carom_status e = crm_solve_bounce(w, s, c, s->v0, plastic);
     if (e < 0) return e;
     crm_copy(w, s->v1, c->v);
     crm_copy(w, s->q1, s->q0);
-    return e;
+    return plastic ? worse(e, CAROM_LIMIT) : e;
 }
 
 static double approach(const crm_substep *s, int k)

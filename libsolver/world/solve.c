@@ -7,6 +7,10 @@
 
 /* How often motors may stop or start to hold in one solve. */
 enum { MAX_SETTLINGS = 20 };
+/* Right-hand sides of an infeasible problem are moved by this share more than they must [1], so
+ * many times. */
+static const double GIVE_WAY = 1e-3;
+enum { MAX_WAYS = 32 };
 
 double crm_rounding(const carom_world *w)
 {
@@ -31,7 +35,6 @@ static void add_stats(carom_world *w, const carom_contact_stats *c)
     carom_step_stats *s = w->stats;
     if (c->status > s->status) s->status = c->status;
     s->residual = fmax(s->residual, c->residual);
-    s->factorizations += c->factorizations;
     s->iterations += c->iterations;
     if (c->stage > s->stage) s->stage = c->stage;
     if (c->blocks > 0) w->factor_blocks = c->blocks;
@@ -58,7 +61,11 @@ static carom_status run_once(carom_world *w, crm_substep *s, crm_solve *c, int u
     const int guess = !use_guess                  ? CAROM_GUESS_NONE
                       : c->kind == CRM_CORRECTION ? CAROM_GUESS_MODES
                                                   : CAROM_GUESS_IMPULSES;
-    const carom_status e = carom_contact_solve(w->solver, &p, guess, &x, &stats);
+    const int pressed = s->slick && c->kind != CRM_CORRECTION;
+    const int brief = w->effort >= CRM_BRIEF && !pressed ? CAROM_GUESS_BRIEF : 0;
+    const carom_status e = carom_contact_solve(w->solver, &p, guess | brief, &x, &stats);
+    w->effort += stats.factorizations;
+    w->stats->factorizations += stats.factorizations;
     if (e < 0) return e;
     add_stats(w, &stats);
     if (c->kind != CRM_CORRECTION) s->degenerate = stats.degenerate;
@@ -98,17 +105,67 @@ carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use
     return e;
 }
 
-carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, const double *v)
+static int unsolved(carom_status e)
 {
-    s->restitution = 1;
+    return e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION;
+}
+
+/* J u + c of one row, u in the order of the island. */
+static double row_value(const double row[6], const int body[2], const double *u, double c)
+{
+    for (int side = 0; side < 2; side++) {
+        if (body[side] < 0) continue;
+        for (int i = 0; i < 3; i++) c += row[3 * side + i] * u[3 * body[side] + i];
+    }
+    return c;
+}
+
+/* The last solve was infeasible by y: moves its right-hand sides by the least that y allows; 0
+ * where no contact is to blame. */
+static int give_way(carom_world *w, const crm_substep *s, crm_solve *c)
+{
+    const crm_rows *r = &w->rows;
+    const carom_contact_problem p = crm_problem(w, s, c);
+    if (carom_contact_certificate(w->solver, r->yn, r->ye)) return 0;
+    double square = 0;
+    double value = 0;
+    double pressed = 0;
+    for (int k = 0; k < p.n_contacts; k++) {
+        pressed += r->yn[k];
+        square += r->yn[k] * r->yn[k];
+        value += r->yn[k] * row_value(&p.jn[6 * k], &p.contact_body[2 * k], p.u, c->cn[k]);
+    }
+    for (int k = 0; k < p.n_joint_rows; k++) {
+        square += r->ye[k] * r->ye[k];
+        value += r->ye[k] * row_value(&p.je[6 * k], &p.joint_body[2 * k], p.u, c->ce[k]);
+    }
+    if (!(value < 0 && pressed > 0)) return 0;
+    const double by = -(1 + GIVE_WAY) * value / square;
+    for (int k = 0; k < p.n_contacts; k++) c->cn[k] += by * r->yn[k];
+    for (int k = 0; k < p.n_joint_rows; k++) c->ce[k] += by * r->ye[k];
+    return 1;
+}
+
+carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, const double *v,
+                              int plastic)
+{
+    s->restitution = !plastic;
+    s->slick = 0;
     crm_velocity_targets(w, s, v, c);
-    const carom_status e = crm_solve_run(w, s, c, 1);
-    if (e != CAROM_E_INFEASIBLE && e != CAROM_E_NO_SOLUTION) return e;
+    carom_status e = crm_solve_run(w, s, c, 1);
+    if (!unsolved(e)) return e;
     s->restitution = 0;
     crm_velocity_targets(w, s, v, c);
-    const carom_status again = crm_solve_run(w, s, c, 0);
-    if (again >= 0 && w->stats->status < CAROM_RELAXED) w->stats->status = CAROM_RELAXED;
-    return again;
+    e = crm_solve_run(w, s, c, 0);
+    if (unsolved(e)) {
+        s->slick = 1;
+        e = crm_solve_run(w, s, c, 0);
+    }
+    for (int k = 0; k < MAX_WAYS && e == CAROM_E_INFEASIBLE && give_way(w, s, c); k++) {
+        e = crm_solve_run(w, s, c, 0);
+    }
+    if (e >= 0 && w->stats->status < CAROM_RELAXED) w->stats->status = CAROM_RELAXED;
+    return e;
 }
 
 static int before(const crm_touch *t, const crm_contact *c)
@@ -282,11 +339,20 @@ void crm_touches_turn(carom_world *w)
     }
 }
 
-carom_status crm_map_run(carom_world *w, double h)
+/* Free flight is exact as it is. */
+static carom_status run_smooth(carom_world *w, double h)
 {
-    if (!w->smooth) return crm_euler(w, h);
-    /* Free flight is exact as it is. */
     const int bound = w->sub.n_contacts > 0 || w->island->n_rows > 0;
     return w->settings.order > 2 && bound && !w->sub.ahead ? crm_extrapolate(w, h)
                                                            : crm_smooth(w, h);
+}
+
+carom_status crm_map_run(carom_world *w, double h)
+{
+    crm_substep *s = &w->sub;
+    carom_status e = w->smooth && s->map != CRM_MAP_EULER ? run_smooth(w, h) : crm_euler(w, h);
+    const int fallen = w->smooth && s->map == CRM_MAP_EULER;
+    if (fallen && e >= 0 && e < CAROM_LIMIT) e = CAROM_LIMIT;
+    s->met = e;
+    return e;
 }

@@ -109,10 +109,10 @@ static carom_status run_located(carom_world *w, double left, int allowed, int *b
     return crm_locate(w, left, allowed, busy);
 }
 
-static carom_status substep(carom_world *w, double *left)
+static carom_status substep(carom_world *w, double *left, int last)
 {
     const int allowed = substeps_allowed(w) - w->n_substeps - 1;
-    int busy = allowed <= 0;
+    int busy = last || allowed <= 0 || w->effort >= CRM_WORN;
     const double since = fmax(w->settings.dt - *left, 0);
     begin_substep(w);
     carom_status e = busy ? CAROM_OK : run_located(w, *left, allowed, &busy);
@@ -151,10 +151,11 @@ static carom_status advance_island(carom_world *w, const crm_island *island)
     crm_enter(w, island);
     w->n_substeps = 0;
     w->n_impacts = 0;
+    w->effort = 0;
     w->first_touch = w->next.n;
     for (int k = 0; left > CARRY_TOL * dt; k++) {
-        if (k >= MAX_SUBSTEPS) return CAROM_E_NO_SOLUTION;
-        const carom_status e = substep(w, &left);
+        if (k >= 2 * MAX_SUBSTEPS) return CAROM_E_NO_SOLUTION;
+        const carom_status e = substep(w, &left, k >= MAX_SUBSTEPS);
         if (e < 0) return e;
     }
     finish_island(w, left);

@@ -103,6 +103,7 @@ static carom_status find_stop(carom_world *w)
         if (s->end == CRM_END_STOP && fabs(f.end) <= f.tol) return CAROM_OK;
         const carom_status e = crm_find_root(w, &f, &h);
         if (e < 0) return e;
+        if (h < CRM_NO_TIME * w->settings.dt) return CAROM_E_NO_SOLUTION;
         end_at_stop(w, k);
     }
     return CAROM_OK;

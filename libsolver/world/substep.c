@@ -100,6 +100,7 @@ static void lay_fixed_rows(const carom_world *w, int n, crm_block *b, void *obje
     r->joint_body = crm_carve(b, 2 * rows, sizeof(int));
     r->je = crm_carve(b, 6 * rows, sizeof(double));
     r->error = crm_carve(b, rows, sizeof(double));
+    r->ye = crm_carve(b, rows, sizeof(double));
     r->u = crm_carve(b, n3, sizeof(double));
     r->v = crm_carve(b, n3, sizeof(double));
     r->inv_mass = crm_carve(b, n3, sizeof(double));
@@ -116,6 +117,7 @@ static void lay_contact_rows(const carom_world *w, int n, crm_block *b, void *ob
     r->jt = crm_carve(b, 6 * m, sizeof(double));
     r->mu = crm_carve(b, m, sizeof(double));
     r->zero = crm_carve(b, m, sizeof(double));
+    r->yn = crm_carve(b, m, sizeof(double));
 }
 
 carom_status crm_rows_create(carom_world *w)

@@ -78,6 +78,7 @@ void crm_free_sealed(carom_world *w)
     crm_free(&w->memory, w->seal_block, w->seal_bytes, 1);
     w->seal_block = NULL;
     crm_rows_free(w);
+    crm_anderson_free(&w->memory, &w->anderson);
     crm_islands_free(w);
     crm_substep_free(w, &w->sub);
     for (int k = 0; k < CRM_MAX_INNER; k++) crm_substep_free(w, &w->inner[k]);

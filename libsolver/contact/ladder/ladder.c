@@ -263,6 +263,6 @@ carom_status crm_ladder_climb(crm_island *s, int use_guess, carom_contact_stage 
         if (try_interior(&c, CAROM_STAGE_INTERIOR_POINT, start)) return CAROM_OK;
     }
     if (crm_farkas(s)) return CAROM_E_INFEASIBLE;
-    if (!s->nc) return CAROM_E_NO_SOLUTION;
+    if (!s->nc || s->brief) return CAROM_E_NO_SOLUTION;
     return try_harder(&c) ? CAROM_OK : CAROM_E_NO_SOLUTION;
 }

@@ -106,8 +106,10 @@ CAROM_API void carom_contact_memory(const carom_contact_solver *solver, size_t *
 typedef enum carom_contact_guess {
     CAROM_GUESS_NONE = 0,
     CAROM_GUESS_MODES = 1,   /* x->mode */
-    CAROM_GUESS_IMPULSES = 2 /* also x->ln, lt, le: of many impulses that give the same motion (a
-                              * box on more feet than it needs) those closest to the guess */
+    CAROM_GUESS_IMPULSES = 2, /* also x->ln, lt, le: of many impulses that give the same motion (a
+                               * box on more feet than it needs) those closest to the guess */
+    CAROM_GUESS_BRIEF = 8     /* or-ed to one of these: no more than active sets and one interior
+                               * point, for callers that rather change the problem than wait */
 } carom_contact_guess;
 
 /* Solves the problem.  use_guess: a carom_contact_guess.  CAROM_OK: residual <= accept.
