@@ -1,0 +1,227 @@
+/* Microseconds per step of small and large scenes: carom with each integrator beside Box2D 2.4 and
+ * Chipmunk 7 where these are installed, one thread, in one run.
+ *
+ * Usage: bench_step [scene [contender]]: numbers from 0; prints a table for docs/performance.md.
+ * Each figure is the least over rounds of the mean over the scene's steps.  Beside it stand the
+ * largest overlap at the end and how far bodies moved that should rest, measured from the poses
+ * with carom_collide for all alike.  A failed step ends in exit code 1. */
+#include "bench/contact/clock.h"
+#include "scene.h"
+
+#include "carom/broadphase.h"
+#include "carom/collide.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* Rounds go on for so long [s], and are at least so many. */
+static const double LONG_ENOUGH = 0.3;
+enum { MIN_ROUNDS = 3, MAX_CONTENDERS = 5 };
+/* A round is cut short after this [s], and is then the only one. */
+static const double BUDGET = 15;
+
+typedef struct figures {
+    double seconds; /* per step */
+    int n_steps;    /* on the clock, of one round */
+    counters c;     /* of one round */
+    double overlap, moved;
+} figures;
+
+/* Poses of a world as carom's shapes. */
+typedef struct snapshot {
+    const scene *s;
+    double *q;
+    carom_vec2 (*corners)[4];
+    carom_shape *shapes;
+    carom_box *boxes;
+} snapshot;
+
+static void *room(int n, size_t size)
+{
+    void *p = calloc((size_t)n + 1, size);
+    if (!p) abort();
+    return p;
+}
+
+static carom_pose pose_of(const snapshot *t, int k)
+{
+    const carom_pose p = {t->q[3 * k], t->q[3 * k + 1], t->q[3 * k + 2]};
+    return p;
+}
+
+static carom_box no_box(void)
+{
+    const carom_box none = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
+    return none;
+}
+
+static snapshot take(const scene *s, const contender *c, void *self)
+{
+    snapshot t = {s, room(3 * s->n_bodies, sizeof(double)),
+                  room(s->n_bodies, 4 * sizeof(carom_vec2)), room(s->n_bodies, sizeof(carom_shape)),
+                  room(s->n_bodies, sizeof(carom_box))};
+    for (int k = 0; k < s->n_bodies; k++) {
+        const scene_body *b = &s->bodies[k];
+        const int disc = b->shape == SHAPE_DISC;
+        const carom_vec2 v[4] = {
+            {-b->hx, -b->hy}, {b->hx, -b->hy}, {b->hx, b->hy}, {-b->hx, b->hy}};
+        const carom_vec2 center = {0, 0};
+        for (int i = 0; i < 4; i++) t.corners[k][i] = disc ? center : v[i];
+        const carom_shape shape = {disc ? b->hx : 0, disc ? 1 : 4, t.corners[k]};
+        t.shapes[k] = shape;
+        c->place(self, k, &t.q[3 * k]);
+        t.boxes[k] = b->shape == SHAPE_NONE ? no_box() : carom_shape_box(&shape, pose_of(&t, k));
+    }
+    return t;
+}
+
+static void release(snapshot *t)
+{
+    free(t->q);
+    free(t->corners);
+    free(t->shapes);
+    free(t->boxes);
+}
+
+static int pinned(const scene *s, int a, int b)
+{
+    for (int k = 0; k < s->n_pins; k++) {
+        const scene_pin *p = &s->pins[k];
+        if ((p->a == a && p->b == b) || (p->a == b && p->b == a)) return 1;
+    }
+    return 0;
+}
+
+static double largest_overlap(const snapshot *t)
+{
+    carom_broadphase *broadphase = NULL;
+    const carom_pair *pairs;
+    int n;
+    double worst = 0;
+    if (carom_broadphase_create(NULL, &broadphase)) abort();
+    if (carom_broadphase_pairs(broadphase, t->s->n_bodies, t->boxes, &n, &pairs)) abort();
+    for (int k = 0; k < n; k++) {
+        const int a = pairs[k].a;
+        const int b = pairs[k].b;
+        if (pinned(t->s, a, b) || !(t->s->bodies[a].moves || t->s->bodies[b].moves)) continue;
+        const carom_manifold m =
+            carom_collide(&t->shapes[a], pose_of(t, a), &t->shapes[b], pose_of(t, b), 0);
+        if (m.count) worst = fmax(worst, -m.distance);
+    }
+    carom_broadphase_destroy(broadphase);
+    return worst;
+}
+
+static double largest_move(const snapshot *t)
+{
+    double worst = 0;
+    for (int k = 0; t->s->rests && k < t->s->n_bodies; k++) {
+        const double *q = t->s->bodies[k].q;
+        worst = fmax(worst, hypot(t->q[3 * k + 1] - q[1], t->q[3 * k + 2] - q[2]));
+    }
+    return worst;
+}
+
+static int step_on_the_clock(const scene *s, const contender *c, void *self, counters *count)
+{
+    const int at_once = s->n_bodies > 100 ? 1 : 10; /* steps between two looks at the clock */
+    const double start = cpu_seconds();
+    for (int k = 0; k < s->n_steps; k++) {
+        if (k % at_once == 0 && cpu_seconds() - start > BUDGET) return k;
+        c->step(self, count);
+    }
+    return s->n_steps;
+}
+
+/* One round: seconds per step. */
+static double run(const scene *s, const contender *c, figures *f)
+{
+    void *self = c->create(s);
+    counters warm = {0, 0, 0, 0, 0};
+    counters count = {0, 0, 0, 0, 0};
+    const double first = cpu_seconds();
+    for (int k = 0; k < s->warm_up && cpu_seconds() - first < BUDGET; k++) c->step(self, &warm);
+    const double start = cpu_seconds();
+    f->n_steps = step_on_the_clock(s, c, self, &count);
+    const double seconds = (cpu_seconds() - start) / f->n_steps;
+    snapshot t = take(s, c, self);
+    f->c = count;
+    if (warm.worst < 0 || warm.worst > f->c.worst) f->c.worst = warm.worst;
+    f->overlap = largest_overlap(&t);
+    f->moved = largest_move(&t);
+    release(&t);
+    c->destroy(self);
+    return seconds;
+}
+
+static figures measure(const scene *s, const contender *c)
+{
+    figures f = {HUGE_VAL, 0, {0, 0, 0, 0, 0}, 0, 0};
+    const double start = cpu_seconds();
+    for (int k = 0; k < MIN_ROUNDS || cpu_seconds() - start < LONG_ENOUGH; k++) {
+        f.seconds = fmin(f.seconds, run(s, c, &f));
+        if (cpu_seconds() - start > BUDGET) break;
+    }
+    return f;
+}
+
+static void print_row(const scene *s, const contender *c, const figures *f, double peer, int own)
+{
+    printf("| %s | %s | %.3g | ", s->name, c->name, 1e6 * f->seconds);
+    if (peer > 0) {
+        printf("%.2g | ", f->seconds / peer);
+    } else {
+        printf("- | ");
+    }
+    if (own) {
+        printf("%.3g | %d | %d | ", (double)f->c.factorizations / f->n_steps, f->c.n_substeps,
+               f->c.n_contacts);
+    } else {
+        printf("- | - | - | ");
+    }
+    printf("%.1e | ", f->overlap);
+    if (s->rests) {
+        printf("%.1e |", f->moved);
+    } else {
+        printf("- |");
+    }
+    if (f->n_steps < s->n_steps) printf(" %d of %d steps", f->n_steps, s->n_steps);
+    if (f->c.worst) printf(" %s", carom_status_name((carom_status)f->c.worst));
+    printf(" |\n");
+    fflush(stdout);
+}
+
+int main(int argc, char **argv)
+{
+    const int only_scene = argc > 1 ? atoi(argv[1]) : -1;
+    const int only_contender = argc > 2 ? atoi(argv[2]) : -1;
+    const contender *all[MAX_CONTENDERS] = {NULL};
+    int n = 0;
+    int failed = 0;
+#ifdef WITH_BOX2D
+    all[n++] = &BOX2D;
+#endif
+#ifdef WITH_CHIPMUNK
+    all[n++] = &CHIPMUNK;
+#endif
+    const int first_own = n;
+    for (int k = 0; k < 3; k++) all[n++] = &CAROM_CONTENDERS[k];
+    printf("| scene | engine | us per step | times Box2D | factorizations per step | "
+           "most sub-steps | contacts | overlap [m] | moved [m] | |\n");
+    printf("|---|---|---|---|---|---|---|---|---|---|\n");
+    for (int k = 0; k < N_SCENES; k++) {
+        if (only_scene >= 0 && only_scene != k) continue;
+        scene s = make_scene(k);
+        double peer = 0;
+        for (int i = 0; i < n; i++) {
+            if (only_contender >= 0 && only_contender != i) continue;
+            const figures f = measure(&s, all[i]);
+            if (i == 0 && first_own > 0) peer = f.seconds;
+            print_row(&s, all[i], &f, peer, i >= first_own);
+            failed |= f.c.worst < 0;
+        }
+        free_scene(&s);
+    }
+    return failed;
+}

@@ -1,0 +1,93 @@
+/* own.c: carom with each of its integrators. */
+#include "scene.h"
+
+#include "carom/world.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+static void must(const carom_world *w, carom_status e)
+{
+    if (e >= 0) return;
+    fprintf(stderr, "carom: %s: %s\n", carom_status_name(e), carom_world_error(w));
+    exit(1);
+}
+
+static void add_body(carom_world *w, const scene_body *b)
+{
+    const carom_vec2 corners[4] = {
+        {-b->hx, -b->hy}, {b->hx, -b->hy}, {b->hx, b->hy}, {-b->hx, b->hy}};
+    const carom_vec2 center = {0, 0};
+    const carom_shape shapes[3] = {{0, 0, NULL}, {b->hx, 1, &center}, {0, 4, corners}};
+    carom_body_def d = carom_body_at(b->moves ? CAROM_DYNAMIC : CAROM_STATIC, b->q[1], b->q[2]);
+    d.pose.angle = b->q[0];
+    for (int k = 0; k < 3; k++) d.velocity[k] = b->v[k];
+    d.n_shapes = b->shape != SHAPE_NONE;
+    d.shapes = &shapes[b->shape];
+    d.mass = b->mass;
+    d.inertia = b->inertia;
+    d.friction = b->friction;
+    d.restitution = b->restitution;
+    must(w, carom_world_add_body(w, &d, NULL));
+}
+
+static void *create(const scene *s, carom_integrator integrator)
+{
+    carom_world_settings set = carom_world_defaults();
+    carom_world *w = NULL;
+    set.dt = s->dt;
+    set.gravity[1] = -s->gravity;
+    set.integrator = (int)integrator;
+    must(NULL, carom_world_create(&set, NULL, &w));
+    for (int k = 0; k < s->n_bodies; k++) add_body(w, &s->bodies[k]);
+    for (int k = 0; k < s->n_pins; k++) {
+        const scene_pin *p = &s->pins[k];
+        const carom_vec2 at = {p->x, p->y};
+        must(w, carom_world_add_revolute(w, p->a, p->b, at, NULL));
+    }
+    must(w, carom_world_seal(w));
+    return w;
+}
+
+static void *create_euler(const scene *s)
+{
+    return create(s, CAROM_EULER);
+}
+
+static void *create_located(const scene *s)
+{
+    return create(s, CAROM_LOCATED);
+}
+
+static void *create_fixed(const scene *s)
+{
+    return create(s, CAROM_FIXED);
+}
+
+static void step(void *self, counters *c)
+{
+    carom_step_stats t;
+    const carom_status e = carom_world_step(self, NULL, &t);
+    c->factorizations += t.factorizations;
+    c->allocations += t.allocations;
+    c->n_contacts = t.n_contacts;
+    if (t.n_substeps > c->n_substeps) c->n_substeps = t.n_substeps;
+    if (c->worst >= 0 && (e < 0 || (int)e > c->worst)) c->worst = (int)e;
+}
+
+static void place(void *self, int body, double q[3])
+{
+    const double *all = carom_world_q(self);
+    for (int k = 0; k < 3; k++) q[k] = all[3 * body + k];
+}
+
+static void destroy(void *self)
+{
+    carom_world_destroy(self);
+}
+
+const contender CAROM_CONTENDERS[3] = {
+    {"carom euler", create_euler, step, place, destroy},
+    {"carom located", create_located, step, place, destroy},
+    {"carom fixed", create_fixed, step, place, destroy},
+};

@@ -1,0 +1,82 @@
+// Box2D 2.4: 8 velocity and 3 position iterations, as its manual has it; nothing sleeps.
+#include "scene.h"
+
+#include <box2d/box2d.h>
+#include <vector>
+
+namespace {
+
+struct world {
+    b2World w;
+    float dt;
+    std::vector<b2Body *> bodies;
+    explicit world(const scene *s) : w(b2Vec2(0.0f, float(-s->gravity))), dt(float(s->dt))
+    {
+        w.SetAllowSleeping(false);
+    }
+};
+
+void add_shape(b2Body *body, const scene_body &b)
+{
+    b2CircleShape circle;
+    b2PolygonShape box;
+    circle.m_radius = float(b.hx);
+    box.SetAsBox(float(b.hx), float(b.hy));
+    b2FixtureDef f;
+    f.shape = b.shape == SHAPE_DISC ? static_cast<b2Shape *>(&circle) : &box;
+    f.density = 1.0f;
+    f.friction = float(b.friction);
+    f.restitution = float(b.restitution);
+    body->CreateFixture(&f);
+}
+
+void add_body(world *self, const scene_body &b)
+{
+    b2BodyDef d;
+    d.type = b.moves ? b2_dynamicBody : b2_staticBody;
+    d.angle = float(b.q[0]);
+    d.position.Set(float(b.q[1]), float(b.q[2]));
+    d.angularVelocity = float(b.v[0]);
+    d.linearVelocity.Set(float(b.v[1]), float(b.v[2]));
+    b2Body *body = self->w.CreateBody(&d);
+    if (b.shape != SHAPE_NONE) add_shape(body, b);
+    self->bodies.push_back(body);
+}
+
+void *create(const scene *s)
+{
+    world *self = new world(s);
+    for (int k = 0; k < s->n_bodies; k++) add_body(self, s->bodies[k]);
+    for (int k = 0; k < s->n_pins; k++) {
+        const scene_pin &p = s->pins[k];
+        b2RevoluteJointDef j;
+        j.Initialize(self->bodies[size_t(p.a)], self->bodies[size_t(p.b)],
+                     b2Vec2(float(p.x), float(p.y)));
+        self->w.CreateJoint(&j);
+    }
+    return self;
+}
+
+void step(void *self, counters *c)
+{
+    world *s = static_cast<world *>(self);
+    s->w.Step(s->dt, 8, 3);
+    c->n_contacts = s->w.GetContactCount();
+}
+
+void place(void *self, int body, double q[3])
+{
+    const b2Body *b = static_cast<world *>(self)->bodies[size_t(body)];
+    q[0] = double(b->GetAngle());
+    q[1] = double(b->GetPosition().x);
+    q[2] = double(b->GetPosition().y);
+}
+
+void destroy(void *self)
+{
+    delete static_cast<world *>(self);
+}
+
+} // namespace
+
+const contender BOX2D = {"Box2D 2.4", create, step, place, destroy};

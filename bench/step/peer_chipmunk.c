@@ -1,0 +1,91 @@
+/* Chipmunk 7: 10 iterations, as it comes; nothing sleeps. */
+#include "scene.h"
+
+#include <chipmunk/chipmunk.h>
+#include <stdlib.h>
+
+typedef struct world {
+    cpSpace *space;
+    double dt;
+    int n_bodies, n_shapes, n_joints;
+    cpBody **bodies;
+    cpShape **shapes;
+    cpConstraint *joints[16];
+} world;
+
+static void add_body(world *s, const scene_body *b)
+{
+    cpBody *body = b->moves ? cpBodyNew(b->mass, b->inertia) : cpBodyNewStatic();
+    cpBodySetAngle(body, b->q[0]);
+    cpBodySetPosition(body, cpv(b->q[1], b->q[2]));
+    if (b->moves) {
+        cpBodySetAngularVelocity(body, b->v[0]);
+        cpBodySetVelocity(body, cpv(b->v[1], b->v[2]));
+    }
+    s->bodies[s->n_bodies++] = cpSpaceAddBody(s->space, body);
+    if (b->shape == SHAPE_NONE) return;
+    cpShape *shape = b->shape == SHAPE_DISC ? cpCircleShapeNew(body, b->hx, cpvzero)
+                                            : cpBoxShapeNew(body, 2 * b->hx, 2 * b->hy, 0);
+    cpShapeSetFriction(shape, b->friction);
+    cpShapeSetElasticity(shape, b->restitution);
+    s->shapes[s->n_shapes++] = cpSpaceAddShape(s->space, shape);
+}
+
+static void *create(const scene *s)
+{
+    world *self = calloc(1, sizeof *self);
+    if (!self) abort();
+    self->space = cpSpaceNew();
+    self->dt = s->dt;
+    self->bodies = calloc((size_t)s->n_bodies, sizeof *self->bodies);
+    self->shapes = calloc((size_t)s->n_bodies, sizeof *self->shapes);
+    if (!self->bodies || !self->shapes) abort();
+    cpSpaceSetGravity(self->space, cpv(0, -s->gravity));
+    for (int k = 0; k < s->n_bodies; k++) add_body(self, &s->bodies[k]);
+    for (int k = 0; k < s->n_pins; k++) {
+        const scene_pin *p = &s->pins[k];
+        cpConstraint *j = cpPivotJointNew(self->bodies[p->a], self->bodies[p->b], cpv(p->x, p->y));
+        cpConstraintSetCollideBodies(j, cpFalse);
+        self->joints[self->n_joints++] = cpSpaceAddConstraint(self->space, j);
+    }
+    return self;
+}
+
+static void step(void *self, counters *c)
+{
+    world *s = self;
+    (void)c;
+    cpSpaceStep(s->space, s->dt);
+}
+
+static void place(void *self, int body, double q[3])
+{
+    const world *s = self;
+    const cpVect p = cpBodyGetPosition(s->bodies[body]);
+    q[0] = cpBodyGetAngle(s->bodies[body]);
+    q[1] = p.x;
+    q[2] = p.y;
+}
+
+static void destroy(void *self)
+{
+    world *s = self;
+    for (int k = 0; k < s->n_joints; k++) {
+        cpSpaceRemoveConstraint(s->space, s->joints[k]);
+        cpConstraintFree(s->joints[k]);
+    }
+    for (int k = 0; k < s->n_shapes; k++) {
+        cpSpaceRemoveShape(s->space, s->shapes[k]);
+        cpShapeFree(s->shapes[k]);
+    }
+    for (int k = 0; k < s->n_bodies; k++) {
+        cpSpaceRemoveBody(s->space, s->bodies[k]);
+        cpBodyFree(s->bodies[k]);
+    }
+    cpSpaceFree(s->space);
+    free(s->shapes);
+    free(s->bodies);
+    free(s);
+}
+
+const contender CHIPMUNK = {"Chipmunk 7", create, step, place, destroy};

@@ -1,0 +1,65 @@
+/* scene.h: scenes for carom's step and its peers, and what a peer must be able to do. */
+#ifndef BENCH_STEP_SCENE_H
+#define BENCH_STEP_SCENE_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum body_shape { SHAPE_NONE, SHAPE_DISC, SHAPE_BOX } body_shape;
+
+typedef struct scene_body {
+    int moves;
+    body_shape shape;
+    double hx, hy; /* half sides; radius = hx [m] */
+    double q[3];   /* (angle, x, y) */
+    double v[3];
+    double mass, inertia;
+    double friction, restitution;
+} scene_body;
+
+typedef struct scene_pin {
+    int a, b;
+    double x, y;
+} scene_pin;
+
+typedef struct scene {
+    const char *name;
+    int n_bodies, max_bodies;
+    scene_body *bodies;
+    int n_pins;
+    scene_pin pins[16];
+    double gravity, dt;
+    int rests;   /* 1: nothing should move */
+    int warm_up; /* steps before the clock runs */
+    int n_steps; /* steps on the clock */
+} scene;
+
+enum { N_SCENES = 11 };
+/* Scene k, 0 <= k < N_SCENES; memory exhausted ends the program. */
+scene make_scene(int k);
+void free_scene(scene *s);
+
+/* What a step was, where the contender says so. */
+typedef struct counters {
+    long factorizations, allocations;
+    int n_contacts, n_substeps; /* most in a step */
+    int worst;                  /* status: negative when a step failed, else the largest */
+} counters;
+
+typedef struct contender {
+    const char *name;
+    void *(*create)(const scene *s);
+    void (*step)(void *self, counters *c);
+    void (*place)(void *self, int body, double q[3]);
+    void (*destroy)(void *self);
+} contender;
+
+extern const contender CAROM_CONTENDERS[3];
+extern const contender BOX2D;
+extern const contender CHIPMUNK;
+
+#ifdef __cplusplus
+}
+#endif
+#endif
