@@ -77,9 +77,9 @@ static int with_cache(void *self, double *sum)
 }
 
 static const contender OWN[3] = {
-    {"carom, poses", MAX_VERTICES, own_create, from_poses, free},
-    {"carom, frames", MAX_VERTICES, own_create, without_cache, free},
-    {"carom, frames, cache", MAX_VERTICES, own_create, with_cache, free},
+    {"carom poses", MAX_VERTICES, own_create, from_poses, free},
+    {"carom frames", MAX_VERTICES, own_create, without_cache, free},
+    {"carom cache", MAX_VERTICES, own_create, with_cache, free},
 };
 
 static int compare(const void *x, const void *y)
