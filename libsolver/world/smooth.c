@@ -157,8 +157,10 @@ static void next_iterate(carom_world *w, const crm_substep *s, crm_solve *c, crm
 {
     crm_anderson *a = &w->anderson;
     const size_t n = (size_t)s->n_contacts;
-    if (memcmp(asked->mode, c->mode, n) != 0) crm_anderson_forget(a);
-    memcpy(asked->mode, c->mode, n);
+    if (n) { /* without contacts there are no arrays of modes */
+        if (memcmp(asked->mode, c->mode, n) != 0) crm_anderson_forget(a);
+        memcpy(asked->mode, c->mode, n);
+    }
     pack_sides(w, s, c, asked, a->point);
     pack_sides(w, s, asked, asked, a->value);
     crm_anderson_next(a);
