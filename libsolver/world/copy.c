@@ -4,7 +4,7 @@
 
 static void copy(void *to, const void *from, int n, size_t size)
 {
-    if (n > 0) memcpy(to, from, (size_t)n * size);
+    if (to && from) memcpy(to, from, (size_t)n * size);
 }
 
 static carom_status copy_bodies(carom_world *w, const carom_world *from)
@@ -48,7 +48,7 @@ static carom_status copy_shapes(carom_world *w, const carom_world *from)
     if (e) return e;
     w->n_shapes = from->n_shapes;
     w->n_vertices = from->n_vertices;
-    for (int k = 0; k < w->n_shapes; k++) {
+    for (int k = 0; w->shapes && k < w->n_shapes; k++) {
         w->shapes[k].view.vertices = w->vertices + w->shapes[k].first_vertex;
     }
     return CAROM_OK;
