@@ -86,7 +86,9 @@ static carom_world *busy_world(carom_integrator integrator)
         if (k) {
             j.lower = -0.4;
             j.upper = 0.4;
+            j.stiffness = 2;
         }
+        if (k == 2) j.motor_limit = 0.5;
         assert_int_equal(carom_world_add_joint(w, &j, NULL), CAROM_OK);
         last = j.body_b;
     }
@@ -111,6 +113,12 @@ static void repeats_bit_for_bit(void **state)
             assert_int_equal(carom_world_restore(b, s.size, s.bytes), CAROM_OK);
             same_snapshots(a, b);
             assert_int_equal(carom_world_n_contacts(a), carom_world_n_contacts(b));
+            for (int m = 0; m < carom_world_n_joints(a); m++) {
+                assert_near(carom_world_joint_force(b, m).torque,
+                            carom_world_joint_force(a, m).torque, 0);
+                assert_near(carom_world_joint_force(b, m).force.y,
+                            carom_world_joint_force(a, m).force.y, 0);
+            }
             contacts += carom_world_n_contacts(b);
             if (k % 12 == 7) same_future(a, b, 6, NAMES[i]);
             scene_run(a, 1, NULL);
@@ -329,7 +337,7 @@ static void refuses_what_does_not_fit(void **state)
 static void refuses_other_scenes(void **state)
 {
     (void)state;
-    for (int change = 0; change < 7; change++) {
+    for (int change = 0; change < 10; change++) {
         carom_world_settings set = carom_world_defaults();
         carom_world *w[2] = {NULL, NULL};
         blob s = {0, NULL};
@@ -342,8 +350,15 @@ static void refuses_other_scenes(void **state)
             const int a = scene_disc(w[k], 1, other == 2 ? 0.6 : 0.5, 0, 2, 0.5, 0);
             const int b = scene_disc(w[k], 1, 0.5, other == 3 ? 2 : 3, 2, 0.5, 0);
             if (other == 4) scene_disc(w[k], 1, 0.5, 6, 2, 0.5, 0);
-            const carom_vec2 at = {1.5, other == 5 ? 2.1 : 2};
-            assert_int_equal(carom_world_add_revolute(w[k], a, b, at, NULL), CAROM_OK);
+            carom_joint_def j = carom_joint_defaults(CAROM_REVOLUTE);
+            j.body_a = a;
+            j.body_b = b;
+            j.anchor.x = 1.5;
+            j.anchor.y = other == 5 ? 2.1 : 2;
+            j.stiffness = other == 7 ? 2 : 1;
+            j.motor_limit = other == 8 ? 2 : 1;
+            j.upper = other == 9 ? 2 : 1;
+            assert_int_equal(carom_world_add_joint(w[k], &j, NULL), CAROM_OK);
             if (other == 6) assert_int_equal(carom_world_exclude(w[k], 0, a), CAROM_OK);
             if (!k) s = snapshot_of(w[k]);
         }

@@ -72,17 +72,10 @@ static void hash_joints(crm_coder *c, const carom_world *w)
         hash_whole(c, j->collide != 0);
         hash_vec(c, j->local_a);
         hash_vec(c, j->local_b);
-        hash_number(c, j->axis);
-        hash_number(c, j->angle);
-        hash_number(c, j->length);
-        hash_number(c, j->lower);
-        hash_number(c, j->upper);
-        hash_number(c, j->restitution);
-        hash_number(c, j->stiffness);
-        hash_number(c, j->damping);
-        hash_number(c, j->rest);
-        hash_number(c, j->motor_speed);
-        hash_number(c, j->motor_limit);
+        const double numbers[] = {j->axis,        j->angle,       j->length,     j->lower,
+                                  j->upper,       j->stiffness,   j->damping,    j->rest,
+                                  j->restitution, j->motor_speed, j->motor_limit};
+        for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) hash_number(c, numbers[i]);
     }
     hash_whole(c, w->n_excluded);
     for (int k = 0; k < w->n_excluded; k++) {
@@ -197,6 +190,7 @@ static void code_state(crm_coder *c, carom_world *w, int *n_touches)
     code_scales(c, w);
     for (int b = 0; b < w->n_bodies; b++) code_body(c, w, b);
     for (int i = 0; i < 2; i++) crm_code_places(c, (size_t)w->n_joint_rows, w->joint_force[i]);
+    crm_code_places(c, (size_t)w->n_joint_rows, w->joint_total);
     *n_touches = w->touches.n;
     crm_code_int(c, n_touches, 0, INT_MAX);
     for (int k = 0; k < *n_touches && !c->bad; k++) {
