@@ -110,6 +110,29 @@ static carom_world *chain(void)
     return w;
 }
 
+/* Zigzag of links whose neighbors weigh 4e5 times as much or less: stage 1 and its adjoint converge
+ * slowly, by the turn of a link times that ratio. */
+static carom_world *uneven_chain(void)
+{
+    static const double mass[4] = {500, 0.002, 800, 0.001};
+    carom_world *w = scene_world(10, 1.0 / 60);
+    carom_vec2 pin = {0, 0};
+    int before = scene_anchor(w);
+    for (int k = 0; k < 4; k++) {
+        const double turn = k % 2 ? -0.7 : 0.5;
+        const carom_vec2 half = {0.5 * cos(turn), 0.5 * sin(turn)};
+        const int b =
+            scene_box(w, mass[k], 0.5, 0.05, at(pin.x + half.x, pin.y + half.y, turn), 0, 0);
+        assert_int_equal(carom_world_add_revolute(w, before, b, pin, NULL), CAROM_OK);
+        pin.x += 2 * half.x;
+        pin.y += 2 * half.y;
+        before = b;
+    }
+    for (int b = 1; b < carom_world_n_bodies(w); b++) w->bodies[b].filter.group = -1;
+    scene_push(w, 3, 0, 2, -2);
+    return w;
+}
+
 static carom_world *pushed_stack(void)
 {
     carom_world *w = scene_world(9.81, 1.0 / 60);
@@ -198,6 +221,7 @@ static const scene SCENES[] = {
     {"oblique slip", oblique_slip, 30, STEP},
     {"two discs", two_discs, 40, STEP},
     {"chain of ten", chain, 15, STEP},
+    {"uneven chain", uneven_chain, 20, 1e-6},
     {"pushed stack", pushed_stack, 20, STEP_OF_FACES},
     {"tumbling box", tumbling_box, 30, STEP},
     {"double pendulum", pendulum, 40, STEP},

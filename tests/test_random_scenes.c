@@ -4,6 +4,7 @@
  * Usage: test_random_scenes [scenes (334) [first seed (1) [steps (30) [integrator]]]], integrator 0
  * Euler, 1 located, 2 fixed, else all; prints what the statuses were and the seeds of the worst
  * cases when given.  1e5 scenes of 2 s: test_random_scenes 33334 1 120. */
+#include "carom/grad.h"
 #include "near.h"
 #include "random_scene.h"
 
@@ -225,10 +226,39 @@ static void fixed(void **state)
     run_integrator(CAROM_FIXED);
 }
 
+/* Where steps end, a gradient of them exists, and it is finite. */
+static void gradients(void **state)
+{
+    (void)state;
+    if (only >= 0 && only != CAROM_LOCATED) return;
+    for (uint64_t seed = first_seed;
+         seed < first_seed + (uint64_t)(n_scenes < 100 ? n_scenes : 100); seed++) {
+        static random_scene s;
+        static double ones[3 * RANDOM_SCENE_BODIES];
+        static double q0[3 * RANDOM_SCENE_BODIES];
+        carom_world_settings set = carom_world_defaults();
+        carom_tape *tape;
+        set.integrator = CAROM_LOCATED;
+        random_scene_make(seed, &set, &s);
+        assert_int_equal(carom_tape_create(s.world, NULL, &tape), CAROM_OK);
+        int n = 0;
+        while (n < 30 && carom_tape_step(tape, NULL, NULL) >= 0) n++;
+        for (int k = 0; k < 3 * s.n_bodies; k++) ones[k] = 1;
+        const carom_state_bar bar = {n, ones, NULL};
+        carom_gradient g = {0};
+        g.q0 = q0;
+        const carom_status e = carom_tape_gradient(tape, 1, &bar, &g, NULL);
+        if (e < 0) fail_msg("seed %llu: %s", (unsigned long long)seed, carom_status_name(e));
+        for (int k = 0; k < 3 * s.n_bodies; k++) assert_true(isfinite(q0[k]));
+        carom_tape_destroy(tape);
+        carom_world_destroy(s.world);
+    }
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(euler), cmocka_unit_test(located),
-                                       cmocka_unit_test(fixed)};
+                                       cmocka_unit_test(fixed), cmocka_unit_test(gradients)};
     if (argc > 1) n_scenes = atoi(argv[1]);
     if (argc > 2) first_seed = strtoull(argv[2], NULL, 10);
     if (argc > 3) n_steps = atoi(argv[3]);

@@ -26,9 +26,10 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
     const size_t k3 = 3 * (size_t)r->world->n_moving;
     const size_t rows = (size_t)r->world->n_joint_rows;
-    double **const full[] = {&r->q_bar,    &r->v_bar,    &r->q_seed,  &r->v_seed,  &r->solve_bar,
-                             &r->pose,     &r->pose_bar, &r->q_after, &r->v_after, &r->column_q,
-                             &r->column_v, &r->start_q,  &r->start_v, &r->late_bar};
+    double **const full[] = {&r->q_bar,   &r->v_bar,    &r->q_seed,   &r->v_seed,   &r->solve_bar,
+                             &r->pose,    &r->pose_bar, &r->rest,     &r->spare_q,  &r->spare_v,
+                             &r->q_after, &r->v_after,  &r->column_q, &r->column_v, &r->start_q,
+                             &r->start_v, &r->late_bar};
     for (size_t k = 0; k < sizeof full / sizeof *full; k++) {
         *full[k] = crm_carve(b, n3, sizeof(double));
     }

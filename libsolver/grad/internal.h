@@ -91,6 +91,8 @@ typedef struct crm_reverse {
     double *late_bar;            /* 3 n_bodies: of v0, through the springs of stage 2 */
     double *pose;                /* 3 n_bodies: end of an iteration of stage 1 */
     double *pose_bar;            /* 3 n_bodies: its cotangent */
+    double *rest;                /* 3 n_bodies: what the passes of stage 1 have left to do */
+    double *spare_q, *spare_v;   /* 3 n_bodies: for cotangents that do not count */
     crm_contact *moved;          /* contacts at the pose of the problem under way */
     int record;                  /* under way */
     crm_unpacked work, inner;    /* the sub-step under way, and one within it */

@@ -1,6 +1,8 @@
 /* smooth.c: the two-stage map backward.  Stage 1 ends at the fixed point v = G(v) of a Newton
  * iteration with fixed rows.  Its adjoint is the sum of the passes l, G'l, G'G'l, ..., which
- * converges as the iteration did; every pass adds what G depends on. */
+ * converges as the iteration did; every pass adds what G depends on.  Where that is slow or
+ * diverges, the sum m = l + G'm is found by Anderson's method, for a linear map as good as GMRES
+ * over the last iterates, and one pass over m adds all. */
 #include "grad/internal.h"
 
 #include <math.h>
@@ -8,6 +10,8 @@
 /* Passes end when the rest is below this [cotangent of the first pass]. */
 static const double PASS_TOL = 1e-15;
 enum { MAX_PASSES = 60 };
+/* Where a pass leaves more than this of the rest, the sum is found otherwise [1]. */
+static const double SLOW = 0.3;
 /* A rest above this after all passes: no gradient rather than a wrong one. */
 static const double PASS_LOOSE = 1e-9;
 
@@ -193,6 +197,70 @@ static carom_status bounce_vjp(crm_reverse *r, crm_substep *s, double *q_bar, do
     return CAROM_OK;
 }
 
+static void pack(const carom_world *w, const double *full, double *x)
+{
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        memcpy(&x[3 * i], &full[3 * w->island->bodies[i]], 3 * sizeof *x);
+    }
+}
+
+static void unpack(const carom_world *w, const double *x, double *full)
+{
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        memcpy(&full[3 * w->island->bodies[i]], &x[3 * i], 3 * sizeof *x);
+    }
+}
+
+/* r->solve_bar = l becomes the solution of m = l + G'm, known to within tol. */
+static carom_status sum_passes(crm_reverse *r, crm_substep *s, double tol, double loose)
+{
+    carom_world *w = r->world;
+    crm_anderson *a = &w->anderson;
+    const int n = 3 * w->island->n_bodies;
+    double none = 0;
+    double error = HUGE_VAL;
+    carom_status e = crm_anderson_start(&w->memory, a, n);
+    if (e < 0) return e;
+    crm_copy(w, r->rest, r->solve_bar);
+    pack(w, r->rest, a->point);
+    for (int k = 0; k < MAX_PASSES && error > tol; k++) {
+        unpack(w, a->point, r->solve_bar);
+        e = pass_vjp(r, s, r->spare_q, r->spare_v, 0, &none);
+        if (e < 0) return e;
+        for (int i = 0; i < 3 * w->n_bodies; i++) r->spare_q[i] = r->spare_v[i] = 0;
+        pack(w, r->rest, a->value);
+        error = 0;
+        for (int i = 0; i < n; i++) {
+            a->value[i] += r->solve_bar[3 * w->island->bodies[i / 3] + i % 3];
+            error = fmax(error, fabs(a->value[i] - a->point[i]));
+        }
+        if (!(error < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
+        crm_anderson_next(a);
+    }
+    unpack(w, a->point, r->solve_bar);
+    return error <= loose ? CAROM_OK : CAROM_E_NO_SOLUTION;
+}
+
+/* Stage 1 backward from the cotangent r->solve_bar of its velocity. */
+static carom_status stage_1_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
+                                int with_parameters, double *h_bar)
+{
+    const double first = largest(r->world, r->solve_bar);
+    double last = HUGE_VAL;
+    for (int k = 0; k < MAX_PASSES; k++) {
+        const double rest = largest(r->world, r->solve_bar);
+        if (rest <= PASS_TOL * first) return CAROM_OK;
+        if (!(rest < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
+        const int slow = k > 1 && rest > SLOW * last;
+        carom_status e = CAROM_OK;
+        if (slow) e = sum_passes(r, s, PASS_TOL * first, PASS_LOOSE * fmax(first, rest));
+        if (e >= 0) e = pass_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+        if (e < 0 || slow) return e;
+        last = rest;
+    }
+    return largest(r->world, r->solve_bar) <= PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
+}
+
 carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
                             int with_parameters, double *h_bar)
 {
@@ -209,11 +277,5 @@ carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, doubl
         e = crm_correction_vjp(r, s, &s->solve[k], q_bar, with_parameters);
     }
     crm_move_vjp(r->world, s, s->solve[0].v, q_bar, r->solve_bar, h_bar);
-    const double first = largest(r->world, r->solve_bar);
-    for (int k = 0; e >= 0 && k < MAX_PASSES; k++) {
-        if (largest(r->world, r->solve_bar) <= PASS_TOL * first) return CAROM_OK;
-        e = pass_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
-    }
-    if (e < 0) return e;
-    return largest(r->world, r->solve_bar) <= PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
+    return e < 0 ? e : stage_1_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
 }
