@@ -46,8 +46,29 @@ static void families_are_solved(void **state)
     assert_in_range(n_missed, 0, n / 200);
 }
 
+/* Cold piles of 300 discs that jam (mu about tan 30 degrees): damped steps find what the interior
+ * point, sweeps and restarts miss, on the way from any of their ends. */
+static void jammed_piles_are_solved(void **state)
+{
+    (void)state;
+    const uint64_t seeds[] = {7001, 7005};
+    carom_contact_solver *s;
+    assert_int_equal(carom_contact_create(NULL, NULL, &s), CAROM_OK);
+    for (int i = 0; i < 2; i++) {
+        rng r = rng_from(seeds[i]);
+        contact_case c = contact_discs(&r, 300, 0.5, 0.8);
+        carom_contact_stats st;
+        assert_int_equal(carom_contact_solve(s, &c.p, CAROM_GUESS_NONE, &c.x, &st), CAROM_OK);
+        assert_int_equal(st.stage, CAROM_STAGE_SWEEPS);
+        assert_at_most("jammed", contact_case_residual(&c), 1e-10);
+        contact_case_free(&c);
+    }
+    carom_contact_destroy(s);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(families_are_solved)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(families_are_solved),
+                                       cmocka_unit_test(jammed_piles_are_solved)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

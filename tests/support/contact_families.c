@@ -77,8 +77,7 @@ static contact_case pyramid(rng *r)
     return c;
 }
 
-/* Discs in hexagonal layers between walls, a fifth of the contacts missing. */
-static contact_case discs(rng *r, int n, double low, double high)
+contact_case contact_discs(rng *r, int n, double low, double high)
 {
     contact_case c = contact_case_new(n, 4 * n, 0);
     const int width = (int)ceil(sqrt((double)n));
@@ -105,12 +104,12 @@ static contact_case discs(rng *r, int n, double low, double high)
 
 static contact_case pile(rng *r)
 {
-    return discs(r, 5 + rng_int(r, 96), 0.1, 0.8);
+    return contact_discs(r, 5 + rng_int(r, 96), 0.1, 0.8);
 }
 
 static contact_case friction(rng *r)
 {
-    return discs(r, 3 + rng_int(r, 38), 1e-3, 1e3);
+    return contact_discs(r, 3 + rng_int(r, 38), 1e-3, 1e3);
 }
 
 /* Boxes jammed between two walls that lean by an angle near the angle of friction. */
@@ -159,7 +158,7 @@ static contact_case chain(rng *r)
 /* A pile that arrives with speed: c = e min(0, J_n v) before gravity. */
 static contact_case restitution(rng *r)
 {
-    contact_case c = discs(r, 3 + rng_int(r, 58), 0.1, 0.5);
+    contact_case c = contact_discs(r, 3 + rng_int(r, 58), 0.1, 0.5);
     const double e = rng_uniform(r, 0.1, 1);
     for (int i = 0; i < 3 * c.p.n_bodies; i++) c.u[i] += rng_uniform(r, -1, 1);
     for (int k = 0; k < c.p.n_contacts; k++) {

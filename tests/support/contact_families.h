@@ -15,4 +15,8 @@ typedef struct contact_family {
 extern const contact_family contact_families[];
 extern const int n_contact_families;
 
+/* Discs in hexagonal layers between walls, a fifth of the contacts missing, a fifth of the discs
+ * heavy half of the time; friction log-uniform in [low, high]. */
+contact_case contact_discs(rng *r, int n, double low, double high);
+
 #endif
