@@ -358,6 +358,7 @@ static carom_status halve(carom_world *w, double h, double left, carom_status fa
 {
     for (int k = 0; k < MAX_HALVINGS; k++) {
         h *= 0.5;
+        crm_guess_load(w, h); /* impulses that ran away are no guess */
         const carom_status e = crm_map_run(w, h);
         end_at_fraction(&w->sub, left);
         if (e >= 0) return e;
@@ -370,6 +371,7 @@ static carom_status run_euler(carom_world *w, double h, double left, carom_statu
 {
     if (w->sub.map == CRM_MAP_EULER) return failed;
     w->sub.map = CRM_MAP_EULER;
+    crm_guess_load(w, h);
     const carom_status e = crm_map_run(w, h);
     if (w->sub.end == CRM_END_FRACTION) w->sub.fraction = h / left;
     return unsolved(e) ? halve(w, h, left, e) : e;
