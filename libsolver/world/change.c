@@ -8,7 +8,7 @@
 static const double SHORT = 1.0 / 256;
 /* Step of the differences along v that give the rates of the rows [of L over the top speed]. */
 static const double RATE_STEP = 1e-4;
-/* Force that counts as none [of the largest at the start].  Where it is zero the acceleration does
+/* Force that counts as none [of those that act].  Where it is zero the acceleration does
  * not jump, so an error d of the time moves the end by d^3: this is more than enough for order 8.
  */
 static const double FORCE_TOL = 1e-9;
@@ -123,16 +123,26 @@ static int next_change(const carom_world *w, change *x)
     }
 }
 
-/* Margins at the start, in the order of next_change, into start[]; the largest. */
-static double margins(const carom_world *w, double *start)
+/* Margins in the order of next_change. */
+static void margins(const carom_world *w, double *list)
 {
-    double largest = 0;
     int n = 0;
-    for (change x = {-1, 1}; next_change(w, &x);) {
-        start[n] = margin(w, &x);
-        largest = fmax(largest, fabs(start[n++]));
+    for (change x = {-1, 1}; next_change(w, &x);) list[n++] = margin(w, &x);
+}
+
+/* A force below this is none: of weights, other free forces, and what bends the ways over L. */
+static double least_force(const carom_world *w, const double *v)
+{
+    const double top = crm_top_speed(w, v);
+    double largest = 0;
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i];
+        double a[3];
+        if (w->bodies[b].type != CAROM_DYNAMIC) continue;
+        crm_free_acceleration(w, b, a);
+        largest = fmax(largest, w->mass[b] * (hypot(a[1], a[2]) + top * top / w->length));
     }
-    return largest;
+    return FORCE_TOL * largest;
 }
 
 /* The change whose straight line meets zero first by the end; 0: none. */
@@ -160,7 +170,8 @@ static carom_status find_change(carom_world *w, double h, int *found)
     *found = 0;
     carom_status e = forces(w, s->q0, s->v0);
     if (e < 0) return e;
-    const double tol = FORCE_TOL * margins(w, start);
+    margins(w, start);
+    const double tol = least_force(w, s->v0);
     e = crm_map_run(w, h);
     for (int round = 0; e >= 0 && round < MAX_CHANGES; round++) {
         search f = {w, {0, 0}};
@@ -182,7 +193,8 @@ static carom_status overdue(carom_world *w, int *any)
     *any = 0;
     if (e < 0) return e;
     double *end = scratch(s)->v;
-    const double tol = FORCE_TOL * margins(w, end);
+    const double tol = least_force(w, s->v1);
+    margins(w, end);
     int n = 0;
     for (change x = {-1, 1}; next_change(w, &x); n++) *any |= end[n] < -tol;
     return e;
