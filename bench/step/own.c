@@ -1,7 +1,5 @@
 /* own.c: carom with each of its integrators. */
-#include "scene.h"
-
-#include "carom/world.h"
+#include "own.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -31,13 +29,14 @@ static void add_body(carom_world *w, const scene_body *b)
     must(w, carom_world_add_body(w, &d, NULL));
 }
 
-static void *create(const scene *s, carom_integrator integrator)
+void *own_create(const scene *s, carom_integrator integrator, int order)
 {
     carom_world_settings set = carom_world_defaults();
     carom_world *w = NULL;
     set.dt = s->dt;
     set.gravity[1] = -s->gravity;
     set.integrator = (int)integrator;
+    set.order = order;
     must(NULL, carom_world_create(&set, NULL, &w));
     for (int k = 0; k < s->n_bodies; k++) add_body(w, &s->bodies[k]);
     for (int k = 0; k < s->n_pins; k++) {
@@ -51,17 +50,17 @@ static void *create(const scene *s, carom_integrator integrator)
 
 static void *create_euler(const scene *s)
 {
-    return create(s, CAROM_EULER);
+    return own_create(s, CAROM_EULER, 2);
 }
 
 static void *create_located(const scene *s)
 {
-    return create(s, CAROM_LOCATED);
+    return own_create(s, CAROM_LOCATED, 2);
 }
 
 static void *create_fixed(const scene *s)
 {
-    return create(s, CAROM_FIXED);
+    return own_create(s, CAROM_FIXED, 2);
 }
 
 static void step(void *self, counters *c)

@@ -2,6 +2,7 @@
 #include "scene.h"
 
 #include <chipmunk/chipmunk.h>
+#include <math.h>
 #include <stdlib.h>
 
 typedef struct world {
@@ -26,8 +27,9 @@ static void add_body(world *s, const scene_body *b)
     if (b->shape == SHAPE_NONE) return;
     cpShape *shape = b->shape == SHAPE_DISC ? cpCircleShapeNew(body, b->hx, cpvzero)
                                             : cpBoxShapeNew(body, 2 * b->hx, 2 * b->hy, 0);
-    cpShapeSetFriction(shape, b->friction);
-    cpShapeSetElasticity(shape, b->restitution);
+    /* It multiplies those of a pair. */
+    cpShapeSetFriction(shape, sqrt(b->friction));
+    cpShapeSetElasticity(shape, sqrt(b->restitution));
     s->shapes[s->n_shapes++] = cpSpaceAddShape(s->space, shape);
 }
 

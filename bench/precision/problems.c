@@ -1,0 +1,164 @@
+#include "problems.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const double PI = 3.14159265358979323846;
+static const double G = 9.81;
+
+static scene make(const char *name)
+{
+    scene s = {0};
+    s.name = name;
+    s.gravity = G;
+    s.max_bodies = 16;
+    s.bodies = calloc(16, sizeof *s.bodies);
+    if (!s.bodies) abort();
+    return s;
+}
+
+/* Of density 1, as the peers weigh it. */
+static int disc(scene *s, double r, double x, double y, double friction, double restitution)
+{
+    const double m = PI * r * r;
+    const scene_body b = {
+        1, SHAPE_DISC, r, r, {0, x, y}, {0, 0, 0}, m, 0.5 * m * r * r, friction, restitution};
+    s->bodies[s->n_bodies] = b;
+    return s->n_bodies++;
+}
+
+static int box(scene *s, double hx, double hy, double angle, double x, double y, double friction)
+{
+    const double m = 4 * hx * hy;
+    const scene_body b = {1,         SHAPE_BOX, hx, hy, {angle, x, y},
+                          {0, 0, 0}, m,         m * (hx * hx + hy * hy) / 3, friction, 0};
+    s->bodies[s->n_bodies] = b;
+    return s->n_bodies++;
+}
+
+static void floor_at_zero(scene *s, double friction, double restitution)
+{
+    const int b = box(s, 20, 1, 0, 0, -1, friction);
+    s->bodies[b].moves = 0;
+    s->bodies[b].restitution = restitution;
+}
+
+static int links(scene *s, int n, double first, double more)
+{
+    double x = 0;
+    double y = 0;
+    int before = box(s, 1, 1, 0, 0, 0, 0);
+    s->bodies[before].moves = 0;
+    s->bodies[before].shape = SHAPE_NONE;
+    for (int k = 0; k < n; k++) {
+        const double a = first + more * k;
+        const scene_pin p = {before, before + 1, x, y};
+        before = box(s, 0.05, 0.5, a, x + 0.5 * sin(a), y - 0.5 * cos(a), 0);
+        s->pins[s->n_pins++] = p;
+        x += sin(a);
+        y -= cos(a);
+    }
+    return before;
+}
+
+static void end_at(problem *p, double angle, double x, double y)
+{
+    p->closed = 1;
+    p->exact[0] = angle;
+    p->exact[1] = x;
+    p->exact[2] = y;
+}
+
+/* Stops after v^2 / (2 mu g). */
+static problem sliding_stop(void)
+{
+    problem p = {"sliding stop", make("slide"), 1.0, 1, 0.5, 0, {0}};
+    floor_at_zero(&p.s, 0.5, 0);
+    box(&p.s, 0.5, 0.25, 0, 0, 0.25, 0.5);
+    p.s.bodies[1].v[1] = 3;
+    end_at(&p, 0, 9 / (2 * 0.5 * G), 0.25);
+    return p;
+}
+
+/* Slides until v / (3 mu g), then rolls at 2 v / 3. */
+static problem slide_to_roll(void)
+{
+    problem p = {"slide to roll", make("roll"), 1.0, 1, 0.5, 0, {0}};
+    floor_at_zero(&p.s, 0.3, 0);
+    disc(&p.s, 0.5, 0, 0.5, 0.3, 0);
+    p.s.bodies[1].v[1] = 3;
+    const double x = 2.0 + 9 / (18 * 0.3 * G);
+    const double slide = 3 / (3 * 0.3 * G);
+    const double spin = 2 * 0.3 * G / 0.5; /* while it slides */
+    end_at(&p, -(0.5 * spin * slide * slide + 4 * (1 - slide)), x, 0.5);
+    return p;
+}
+
+/* Three bounces of restitution 0.8. */
+static problem bounce(void)
+{
+    problem p = {"bounce", make("bounce"), 2.0, 1, 0.25, 0, {0}};
+    floor_at_zero(&p.s, 0.5, 0.8);
+    disc(&p.s, 0.25, 0, 1.25, 0.5, 0.8);
+    double v = sqrt(2 * G);
+    double t = p.duration - v / G;
+    for (v *= 0.8; t > 2 * v / G; v *= 0.8) t -= 2 * v / G;
+    end_at(&p, 0, 0, 0.25 + v * t - 0.5 * G * t * t);
+    return p;
+}
+
+/* A disc meets the floor without gravity and sticks to it: v_t = 2/3 of before, v_n = -e of before. */
+static problem oblique_impact(void)
+{
+    problem p = {"oblique impact", make("oblique"), 1.0, 1, 0.5, 0, {0}};
+    p.s.gravity = 0;
+    floor_at_zero(&p.s, 0.6, 0.5);
+    disc(&p.s, 0.5, 0, 1, 0.6, 0.5);
+    p.s.bodies[1].v[1] = 1;
+    p.s.bodies[1].v[2] = -1.5;
+    const double t = 0.5 / 1.5;
+    const double left = 1 - t;
+    end_at(&p, -(2.0 / 3) / 0.5 * left, t + 2.0 / 3 * left, 0.5 + 0.75 * left);
+    return p;
+}
+
+static problem swing(const char *name, int n, double duration)
+{
+    problem p = {name, make(name), duration, 0, 0.5, 0, {0}};
+    p.body = links(&p.s, n, 1, 0.2);
+    return p;
+}
+
+/* Rolls, slips and leaves. */
+static problem disc_on_disc(void)
+{
+    problem p = {"disc off disc", make("disc"), 1.0, 1, 0.3, 0, {0}};
+    disc(&p.s, 1, 0, 0, 0.9, 0);
+    p.s.bodies[0].moves = 0;
+    disc(&p.s, 0.3, 1.3 * sin(0.3), 1.3 * cos(0.3), 0.9, 0);
+    return p;
+}
+
+/* Rocks from foot to foot. */
+static problem rocking(void)
+{
+    problem p = {"rocking block", make("rocking"), 1.0, 1, 0.5, 0, {0}};
+    floor_at_zero(&p.s, 0.9, 0);
+    box(&p.s, 0.2, 0.5, 0.15, 0, 0.2 * sin(0.15) + 0.5 * cos(0.15), 0.9);
+    return p;
+}
+
+problem make_problem(int k)
+{
+    switch (k) {
+    case 0: return sliding_stop();
+    case 1: return slide_to_roll();
+    case 2: return bounce();
+    case 3: return oblique_impact();
+    case 4: return swing("pendulum", 1, 1);
+    case 5: return swing("double pendulum", 2, 1);
+    case 6: return swing("chain of 10", 10, 1);
+    case 7: return disc_on_disc();
+    default: return rocking();
+    }
+}

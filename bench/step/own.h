@@ -1,0 +1,12 @@
+/* own.h: carom as a contender. */
+#ifndef BENCH_STEP_OWN_H
+#define BENCH_STEP_OWN_H
+
+#include "scene.h"
+
+#include "carom/world.h"
+
+/* A sealed world of the scene; a failure ends the program. */
+void *own_create(const scene *s, carom_integrator integrator, int order);
+
+#endif
