@@ -1,5 +1,6 @@
 /* The contact solver: time, instructions, factorizations; block LU beside KLU on the same matrix.
- * Usage: bench_contact [csv | resting ROWS]   (the last for callgrind: one warm solve) */
+ * Usage: bench_contact [csv | resting ROWS N]   (the last for callgrind: N solves at rest after one
+ * cold one; the difference of two runs is what N cost) */
 #include "carom/contact.h"
 #include "clock.h"
 #include "libsolver/contact/ladder/ladder.h"
@@ -231,15 +232,15 @@ static void run_case(const char *name, contact_case c, int csv)
     contact_case_free(&b.c);
 }
 
-/* One cold solve, then one that callgrind is to look at. */
-static int run_resting(int rows)
+/* One cold solve, then n from its solution. */
+static int run_resting(int rows, int n)
 {
     contact_case c = scene_pyramid(rows);
     carom_contact_solver *s;
     if (carom_contact_create(NULL, NULL, &s) < 0) return 1;
     carom_contact_stats st = {0};
     carom_contact_solve(s, &c.p, CAROM_GUESS_NONE, &c.x, &st);
-    for (int i = 0; i < 10; i++) carom_contact_solve(s, &c.p, CAROM_GUESS_IMPULSES, &c.x, &st);
+    for (int i = 0; i < n; i++) carom_contact_solve(s, &c.p, CAROM_GUESS_IMPULSES, &c.x, &st);
     printf("%d contacts, %d factorizations\n", c.p.n_contacts, st.factorizations);
     carom_contact_destroy(s);
     contact_case_free(&c);
@@ -248,7 +249,7 @@ static int run_resting(int rows)
 
 int main(int argc, char **argv)
 {
-    if (argc > 2 && !strcmp(argv[1], "resting")) return run_resting(atoi(argv[2]));
+    if (argc > 3 && !strcmp(argv[1], "resting")) return run_resting(atoi(argv[2]), atoi(argv[3]));
     const int csv = argc > 1 && !strcmp(argv[1], "csv");
     printf(csv ? "scene,bodies,contacts,status,residual,factor_us,klu_us,assemble_us,klu_ratio,"
                  "assemble_share,cold_factorizations,cold_us,warm_factorizations,warm_us,"

@@ -102,7 +102,7 @@ static int exact_mode(const crm_island *s, int k)
     const crm_contact *c = &s->contact[k];
     const double tiny_n = row_rounding(s, c->n, c->a, c->b, c->cn);
     const double tiny_t = row_rounding(s, c->t, c->a, c->b, c->ct);
-    const int to = crm_contact_mode_of(c, s->x.n[k], s->x.t[k], s->an[k], s->ut[k]);
+    const int to = (int)crm_contact_mode_of(c, s->x.n[k], s->x.t[k], s->an[k], s->ut[k]);
     if (mode_fits(s, k, s->mode[k], tiny_n, tiny_t)) return s->mode[k];
     return mode_fits(s, k, (unsigned char)to, tiny_n, tiny_t) ? to : -1;
 }

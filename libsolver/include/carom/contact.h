@@ -71,7 +71,7 @@ typedef enum carom_contact_stage {
     CAROM_STAGE_FREE,           /* active set from the free motion */
     CAROM_STAGE_STICK,          /* active set from all contacts sticking */
     CAROM_STAGE_INTERIOR_POINT, /* then polished by active set */
-    CAROM_STAGE_SWEEPS,         /* projected Gauss-Seidel, then polished */
+    CAROM_STAGE_SWEEPS, /* projected Gauss-Seidel, with damped Newton steps or alone; polished */
     CAROM_STAGE_LEMKE,
     CAROM_STAGE_RESTART
 } carom_contact_stage;
@@ -105,7 +105,7 @@ CAROM_API void carom_contact_memory(const carom_contact_solver *solver, size_t *
 /* What carom_contact_solve may take from x as its first guess. */
 typedef enum carom_contact_guess {
     CAROM_GUESS_NONE = 0,
-    CAROM_GUESS_MODES = 1,   /* x->mode */
+    CAROM_GUESS_MODES = 1,    /* x->mode */
     CAROM_GUESS_IMPULSES = 2, /* also x->ln, lt, le: of many impulses that give the same motion (a
                                * box on more feet than it needs) those closest to the guess */
     CAROM_GUESS_BRIEF = 8     /* or-ed to one of these: no more than active sets and one interior
