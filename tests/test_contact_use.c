@@ -345,6 +345,36 @@ static void every_allocation_may_fail(void **state)
     contact_case_free(&c);
 }
 
+/* A ball that has to bounce from the floor, under a ceiling: the certificate names the restitution
+ * that cannot be; the caller who gives that one up, and no other, has a solution. */
+static void caller_relaxes_what_the_certificate_names(void **state)
+{
+    (void)state;
+    contact_case c = contact_case_new(2, 3, 0);
+    const double up[2] = {0, 1};
+    const double down[2] = {0, -1};
+    const double zero[2] = {0, 0};
+    carom_contact_solver *s;
+    double yn[3];
+    for (int b = 0; b < 2; b++) contact_case_body(&c, b, 1, 1, 0, 0, -1);
+    contact_case_contact(&c, -1, 0, zero, zero, up, 0, -0.5); /* e = 1/2 after speed 1 */
+    contact_case_contact(&c, -1, 0, zero, zero, down, 0, 0);
+    contact_case_contact(&c, -1, 1, zero, zero, up, 0, -0.5); /* another ball, free to bounce */
+    assert_int_equal(carom_contact_create(NULL, NULL, &s), CAROM_OK);
+    assert_int_equal(carom_contact_solve(s, &c.p, CAROM_GUESS_NONE, &c.x, NULL),
+                     CAROM_E_INFEASIBLE);
+    assert_int_equal(carom_contact_certificate(s, yn, NULL), CAROM_OK);
+    assert_true(yn[0] > 0 && yn[1] > 0 && yn[2] == 0);
+    for (int k = 0; k < 3; k++) {
+        if (yn[k] > 0) c.cn[k] = fmax(0, c.cn[k]);
+    }
+    assert_int_equal(carom_contact_solve(s, &c.p, CAROM_GUESS_NONE, &c.x, NULL), CAROM_OK);
+    assert_near(c.x.v[2], 0, CLOSE);
+    assert_near(c.x.v[5], 0.5, CLOSE);
+    carom_contact_destroy(s);
+    contact_case_free(&c);
+}
+
 /* One iteration, no restart, a tolerance out of reach: the best point and its residual. */
 static void failure_is_reported(void **state)
 {
@@ -382,6 +412,7 @@ int main(void)
         cmocka_unit_test(tall_stack_at_rest_costs_nothing),
         cmocka_unit_test(no_allocation_in_steady_state),
         cmocka_unit_test(every_allocation_may_fail),
+        cmocka_unit_test(caller_relaxes_what_the_certificate_names),
         cmocka_unit_test(failure_is_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
