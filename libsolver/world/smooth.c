@@ -400,11 +400,17 @@ static double approach(const crm_substep *s, int k)
     return crm_row_dot(jn, s->v0, c->body_a, c->body_b);
 }
 
+/* Approach that may be rounding. */
+static double rounding_speed(const carom_world *w, const crm_substep *s)
+{
+    return CRM_REST_TOL * (crm_top_speed(w, s->v0) + w->speed);
+}
+
 int crm_select_impact(carom_world *w)
 {
     crm_substep *s = &w->sub;
     const double hit = CRM_HIT_TOL * w->length + crm_rounding(w);
-    const double slow = CRM_REST_TOL * (crm_top_speed(w, s->v0) + w->speed);
+    const double slow = rounding_speed(w, s);
     int any = 0;
     for (int k = 0; k < s->n_contacts; k++) {
         if (s->contacts[k].gap <= hit && approach(s, k) < -slow) any = 1;
@@ -416,11 +422,13 @@ void crm_select_contacts(carom_world *w, int for_impact)
 {
     crm_substep *s = &w->sub;
     const double slop = w->settings.margin * w->length;
+    /* Without gravity nothing but rounding is slow. */
+    const double rest = fmax(w->rest_speed, rounding_speed(w, s));
     int n = 0;
     for (int k = 0; k < s->n_contacts; k++) {
         const double un = approach(s, k);
-        const int meets = un <= w->rest_speed || s->contacts[k].gap < -slop;
-        const int rests = meets && (un >= -w->rest_speed || s->contacts[k].gap < -slop);
+        const int meets = un <= rest || s->contacts[k].gap < -slop;
+        const int rests = meets && (un >= -rest || s->contacts[k].gap < -slop);
         if (for_impact ? meets : rests) s->contacts[n++] = s->contacts[k];
     }
     s->n_contacts = n;

@@ -7,6 +7,8 @@
 static const double CARRY_TOL = 1e-13;
 /* Moving bodies times sub-steps of one frame, and sub-steps beyond all counting. */
 enum { BODY_SUBSTEPS = 128, MAX_SUBSTEPS = 256 };
+/* How often contacts are added that only the end of a sub-step shows. */
+enum { MAX_LOOKS = 3 };
 /* How often pairs are looked for again when bodies leave the room foreseen for them. */
 enum { MAX_WIDENINGS = 4 };
 /* Impacts without time between them, after which all that touches stops approaching at once: a
@@ -80,13 +82,28 @@ static int met_ahead(const crm_substep *s)
     return 0;
 }
 
+/* One sub-step over all contacts ahead, and over those that its end shows. */
+static carom_status run_ahead(carom_world *w, double left)
+{
+    int added = 1;
+    int deep = 0;
+    carom_status e = CAROM_OK;
+    for (int k = 0; e >= 0 && added && k <= MAX_LOOKS; k++) {
+        crm_guess_load(w, left);
+        e = crm_run_through(w, left);
+        if (e < 0) return e;
+        const carom_status f = crm_detect_further(w, k < MAX_LOOKS, &added, &deep);
+        if (f < 0) return f;
+    }
+    return deep && e < CAROM_LIMIT ? CAROM_LIMIT : e;
+}
+
 /* The rest of the frame as one sub-step; events in it are said, unless nobody asked for them. */
 static carom_status run_last(carom_world *w, double left)
 {
     carom_status e = find_contacts(w, left, 1);
     if (e < 0) return e;
-    crm_guess_load(w, left);
-    e = crm_run_through(w, left);
+    e = run_ahead(w, left);
     if (e >= 0 && w->n_substeps + 1 < w->settings.max_substeps) {
         const carom_status stopped = crm_stop_passing(w, left);
         if (stopped) e = stopped;
