@@ -4,9 +4,6 @@
 
 #include <math.h>
 
-/* Overlap at the end that is worth another solve [L]. */
-static const double DEEP = 1e-4;
-
 /* Where the contacts of a pair begin among those of sub, or would. */
 static int place_of(const crm_substep *s, carom_pair pair)
 {
@@ -51,7 +48,7 @@ static carom_status add_pair(carom_world *w, carom_pair pair, const carom_manifo
     const double slop = w->settings.margin * w->length;
     for (int i = 0; i < m->count; i++) {
         crm_contact c = crm_contact_of(w, pair, m, i, s->q1);
-        if (c.gap > -DEEP * w->length) continue;
+        if (c.gap > -CRM_DEEP * w->length) continue;
         const int at = place_for(s, &c);
         crm_contact_refresh(w, s->q0, &c);
         if (at < 0 || c.gap < -slop) continue;
@@ -72,8 +69,9 @@ carom_status crm_detect_further(carom_world *w, int look, int *added, int *deep)
         const carom_pair pair = island->pairs[k];
         if (crm_far_apart(w, pair, w->sub.q1, 0)) continue;
         const carom_manifold m = crm_collide(w, pair, w->sub.q1, 0);
-        if (!m.count || m.distance > -DEEP * w->length) continue;
-        *deep |= m.distance < crm_collide(w, pair, w->sub.q0, HUGE_VAL).distance - DEEP * w->length;
+        if (!m.count || m.distance > -CRM_DEEP * w->length) continue;
+        *deep |=
+            m.distance < crm_collide(w, pair, w->sub.q0, HUGE_VAL).distance - CRM_DEEP * w->length;
         const carom_status e = look ? add_pair(w, pair, &m, added) : CAROM_OK;
         if (e) return e;
     }

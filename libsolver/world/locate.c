@@ -116,7 +116,16 @@ typedef struct search {
     double hit; /* gap that touches [m] */
     int any;    /* how many */
     watch best;
+    int deep; /* 1: an overlap is new that no event explains */
 } search;
+
+/* Overlap at q1 that the pair did not have at q0. */
+static int is_new(const carom_world *w, const watch *x)
+{
+    const double deep = CRM_DEEP * w->length;
+    if (x->limit || x->g1 > -deep) return 0;
+    return x->g1 < crm_collide(w, x->pair, w->sub.q0, HUGE_VAL).distance - deep;
+}
 
 /* x->g1 is the gap at x->at. */
 static void consider(search *f, const watch *x)
@@ -125,7 +134,10 @@ static void consider(search *f, const watch *x)
     watch y = *x;
     y.touches = x->g1 >= -f->tol;
     watch_start(f->w, &y);
-    if (!(y.g0 > 0) || !(y.g1 <= f->hit) || (y.touches && y.opened)) return;
+    if (!(y.g0 > 0) || !(y.g1 <= f->hit) || (y.touches && y.opened)) {
+        f->deep |= x->at >= 1 && is_new(f->w, x);
+        return;
+    }
     if (!f->any || earlier(&y, &f->best)) f->best = y;
     f->any++;
 }
@@ -228,12 +240,17 @@ static void consider_limits(search *f)
     }
 }
 
-/* The earliest watched gap that has closed at q1, into *found; 0 when there is none. */
-static void first_closed(carom_world *w, watch *found, int *any)
+/* The earliest watched gap that has closed at q1, into *found; *any = 0 when there is none.  1 when
+ * an overlap is new that no event explains. */
+static int first_closed(carom_world *w, watch *found, int *any)
 {
     const double noise = crm_rounding(w);
-    search f = {w, w->settings.penetration * w->length + noise, CRM_HIT_TOL * w->length + noise, 0,
-                watch_of(NO_PAIR)};
+    search f = {w,
+                w->settings.penetration * w->length + noise,
+                CRM_HIT_TOL * w->length + noise,
+                0,
+                watch_of(NO_PAIR),
+                0};
     int cursor = 0;
     for (int k = 0; k < w->island->n_pairs; k++) {
         const carom_pair pair = w->island->pairs[k];
@@ -247,6 +264,7 @@ static void first_closed(carom_world *w, watch *found, int *any)
     consider_limits(&f);
     *any = f.any;
     *found = f.best;
+    return f.deep;
 }
 
 carom_status crm_find_root(carom_world *w, const crm_indicator *f, double *h)
@@ -448,7 +466,8 @@ carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
     for (int k = 0; e >= 0 && k < MAX_HALVINGS; k++) {
         watch x;
         int any;
-        first_closed(w, &x, &any);
+        const int deep = first_closed(w, &x, &any);
+        if (deep && !any) e = e < 0 || e > CAROM_LIMIT ? e : CAROM_LIMIT;
         *busy = any > allowed;
         if (*busy) return CAROM_OK;
         double h = s->h;
