@@ -63,7 +63,9 @@ carom_status crm_solver_prepare(carom_contact_solver *c, const carom_contact_pro
         if (s < 0) return s;
         c->pattern_valid = 1;
     }
-    return crm_system_reserve(m, &c->system, &c->graph, &c->pattern);
+    s = crm_system_reserve(m, &c->system, &c->graph, &c->pattern);
+    for (int i = 0; s >= 0 && !same && i < c->graph.n_islands; i++) c->system.key[i].valid = 0;
+    return s;
 }
 
 /* Rows that no impulse can change must hold as they are. */

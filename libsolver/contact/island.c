@@ -204,8 +204,44 @@ void crm_island_assemble(crm_island *s, double shift, double delta)
     for (int q = 0; q < s->ng; q++) assemble_group(s, q, delta);
 }
 
+/* n and t of a contact lie one behind the other. */
+static int key_holds(const crm_island *s, double shift, double delta)
+{
+    const crm_factor_key *key = s->key;
+    if (!key->valid || key->shift != shift || key->delta != delta) return 0;
+    if (s->nc && memcmp(s->key_response, s->response, (size_t)s->nc * sizeof *s->response)) {
+        return 0;
+    }
+    for (int k = 0; k < s->nc; k++) {
+        if (memcmp(s->key_row + CRM_KEY_ROW * k, s->contact[k].n, CRM_KEY_ROW * sizeof(double))) {
+            return 0;
+        }
+    }
+    for (int q = 0; q < s->ng; q++) {
+        const double *row = s->key_group + CRM_KEY_GROUP * q;
+        if (memcmp(row, s->group[q].j, CRM_KEY_GROUP * sizeof *row)) return 0;
+    }
+    return 1;
+}
+
+static void set_key(crm_island *s, double shift, double delta)
+{
+    const crm_factor_key key = {1, shift, delta};
+    *s->key = key;
+    for (int k = 0; k < s->nc; k++) {
+        s->key_response[k] = s->response[k];
+        memcpy(s->key_row + CRM_KEY_ROW * k, s->contact[k].n, CRM_KEY_ROW * sizeof(double));
+    }
+    for (int q = 0; q < s->ng; q++) {
+        double *row = s->key_group + CRM_KEY_GROUP * q;
+        memcpy(row, s->group[q].j, CRM_KEY_GROUP * sizeof *row);
+    }
+}
+
 void crm_island_factor(crm_island *s, double shift, double delta)
 {
+    if (key_holds(s, shift, delta)) return;
+    set_key(s, shift, delta);
     crm_island_assemble(s, shift, delta);
     crm_block_factor(&s->lu);
     s->factorizations++;

@@ -52,6 +52,15 @@ typedef struct crm_response {
     double tt;
 } crm_response;
 
+/* What the factors of an island were made of.  A matrix that comes again, as when only the
+ * right-hand sides of a problem change, is not factored again; the factors are the same bits. */
+enum { CRM_KEY_ROW = 12, CRM_KEY_GROUP = 6 * CRM_GROUP_ROWS };
+typedef struct crm_factor_key {
+    int valid;
+    double shift;
+    double delta;
+} crm_factor_key;
+
 enum { CRM_N_VECTORS = 9, CRM_N_SLACKS = 19 };
 
 typedef struct crm_island {
@@ -65,6 +74,10 @@ typedef struct crm_island {
     const int *group_target;
     crm_block_lu lu;
     crm_response *response; /* nc */
+    crm_factor_key *key;
+    double *key_row;            /* CRM_KEY_ROW per contact: n, then t */
+    crm_response *key_response; /* nc */
+    double *key_group;          /* CRM_KEY_GROUP per group */
     /* Work. */
     crm_vec x;
     crm_vec best;

@@ -22,6 +22,10 @@ static void layout(crm_arena *a, crm_system *y, const crm_graph *g, const crm_bl
     y->speed = crm_arena_doubles(a, g->n_islands);
     y->outcome = crm_arena_take(a, (size_t)g->n_islands, sizeof(crm_outcome));
     y->response = crm_arena_take(a, (size_t)nc, sizeof(crm_response));
+    y->key = crm_arena_take(a, (size_t)g->n_islands, sizeof(crm_factor_key));
+    y->key_row = crm_arena_doubles(a, CRM_KEY_ROW * nc);
+    y->key_response = crm_arena_take(a, (size_t)nc, sizeof(crm_response));
+    y->key_group = crm_arena_doubles(a, CRM_KEY_GROUP * ng);
     for (int i = 0; i < CRM_N_VECTORS; i++) {
         y->vec[i].z = crm_arena_doubles(a, 3 * (nn + ng));
         y->vec[i].n = crm_arena_doubles(a, nc);
@@ -243,6 +247,10 @@ crm_island crm_system_island(const crm_system *y, const crm_graph *g, const crm_
                     .contact_target = s->contact_target + contact,
                     .group_target = s->group_target + 2 * group,
                     .response = y->response + contact,
+                    .key = y->key + island,
+                    .key_row = y->key_row + CRM_KEY_ROW * (size_t)contact,
+                    .key_response = y->key_response + contact,
+                    .key_group = y->key_group + CRM_KEY_GROUP * (size_t)group,
                     .an = y->an + contact,
                     .ut = y->ut + contact,
                     .size = y->size + 3 * node,

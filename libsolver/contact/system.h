@@ -28,6 +28,10 @@ typedef struct crm_system {
     crm_outcome *outcome; /* per island */
     /* Work of the islands, sliced. */
     crm_response *response;
+    crm_factor_key *key; /* per island */
+    double *key_row;
+    crm_response *key_response;
+    double *key_group;
     crm_vec vec[CRM_N_VECTORS];
     double *an;
     double *ut;

@@ -66,7 +66,7 @@ static double opening_speed(const crm_contact *c, const double *v)
 }
 
 /* Slowest opening of the points of a closed watch at q0; HUGE_VAL without any. */
-static double opening_of(const carom_world *w, const watch *x)
+static double opening_of(const carom_world *w, const watch *x, double hit)
 {
     const crm_substep *s = &w->sub;
     double opening = HUGE_VAL;
@@ -74,7 +74,7 @@ static double opening_of(const carom_world *w, const watch *x)
         const crm_contact c = crm_limit_at(w, x->limit, s->q0);
         return opening_speed(&c, s->v0);
     }
-    const carom_manifold m = crm_collide(w, x->pair, s->q0, w->settings.margin * w->length);
+    const carom_manifold m = crm_collide(w, x->pair, s->q0, hit);
     for (int k = 0; k < m.count; k++) {
         const crm_contact c = crm_contact_of(w, x->pair, &m, k, s->q0);
         if (x->by_recipe && !crm_recipe_same(c.recipe, x->recipe)) continue;
@@ -87,9 +87,10 @@ static double opening_of(const carom_world *w, const watch *x)
 static void watch_start(const carom_world *w, watch *x)
 {
     const crm_substep *s = &w->sub;
+    const double hit = CRM_HIT_TOL * w->length + crm_rounding(w);
     x->g0 = watch_gap(w, x, s->q0);
-    if (x->g0 > w->settings.margin * w->length) return;
-    const double opening = opening_of(w, x);
+    if (x->g0 > hit) return;
+    const double opening = opening_of(w, x, hit);
     if (!(opening > 0 && opening < HUGE_VAL)) {
         /* A feature of a pair that touches there already is held by its other points. */
         if (x->by_recipe) x->g0 = 0;
