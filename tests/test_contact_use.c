@@ -205,9 +205,9 @@ static void order_of_contacts_does_not_matter(void **state)
     }
 }
 
-/* A solution as the guess: of the same problem it takes no factorization, of a neighbor one, also
- * where many impulses give the same motion; modes alone take one where they fit the impulses
- * nearest to zero. */
+/* A solution as the guess: of the same problem, and of one with other right-hand sides, it takes no
+ * factorization, for the last one is kept; of a neighbor one, also where many impulses give the
+ * same motion; modes alone take at most one where they fit the impulses nearest to zero. */
 static void good_guess_takes_one_factorization(void **state)
 {
     (void)state;
@@ -225,10 +225,17 @@ static void good_guess_takes_one_factorization(void **state)
         assert_near_array("impulses", 18, c.x.v, v, CLOSE);
         for (int i = 0; i < 6; i++) c.u[3 * i + 2] *= 1.001; /* all impulses scale */
         assert_int_equal(carom_contact_solve(s, &c.p, CAROM_GUESS_IMPULSES, &c.x, &st), CAROM_OK);
+        assert_int_equal(st.factorizations, 0);
+        for (int i = 0; i < 6; i++) {
+            c.u[3 * i + 2] *= 1.001;
+            c.inv_mass[3 * i] *= 1.001; /* another matrix */
+        }
+        assert_int_equal(carom_contact_solve(s, &c.p, CAROM_GUESS_IMPULSES, &c.x, &st), CAROM_OK);
         assert_int_equal(st.factorizations, 1);
+        for (int i = 0; i < 6; i++) c.inv_mass[3 * i] /= 1.001;
         for (int i = 0; i < 6; i++) c.u[3 * i + 2] = -GRAVITY * STEP;
         assert_int_equal(carom_contact_solve(s, &c.p, CAROM_GUESS_MODES, &c.x, &st), CAROM_OK);
-        if (!pushed) assert_int_equal(st.factorizations, 1);
+        if (!pushed) assert_in_range(st.factorizations, 0, 1);
         assert_near_array("modes", 18, c.x.v, v, CLOSE);
         for (int k = 0; k < 12; k++) {
             c.x.mode[k] = CAROM_UNKNOWN;
@@ -260,7 +267,8 @@ static void tall_stack_at_rest_costs_nothing(void **state)
     assert_memory_equal(c.x.ln, d.x.ln, 600 * sizeof(double));
     d.u[2] *= 1 + 1e-9; /* a change beyond rounding is seen */
     assert_int_equal(carom_contact_solve(s, &d.p, CAROM_GUESS_IMPULSES, &d.x, &st), CAROM_OK);
-    assert_int_equal(st.factorizations, 1);
+    assert_memory_not_equal(c.x.ln, d.x.ln, 600 * sizeof(double));
+    assert_at_most("residual", contact_case_residual(&d), 1e-10);
     carom_contact_destroy(s);
     contact_case_free(&c);
     contact_case_free(&d);
