@@ -278,6 +278,7 @@ carom_status crm_find_root(carom_world *w, const crm_indicator *f, double *h)
     for (int i = 0; i < MAX_ROOT_STEPS; i++) {
         double t = i < MAX_ROOT_STEPS / 2 ? (a * gb - b * ga) / (gb - ga) : 0.5 * (a + b);
         if (!(t > a && t < b)) t = 0.5 * (a + b);
+        if (w->effort >= 2 * CRM_WORN) return CAROM_E_NO_SOLUTION;
         const carom_status e = crm_map_run(w, t);
         if (e < 0) return e;
         *h = t;

@@ -173,7 +173,7 @@ static carom_status iterate(carom_world *w, crm_substep *s, crm_solve *c)
     const double tol = NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
     double best = HUGE_VAL;
     int vain = 0;
-    for (int k = 0; k < MAX_NEWTON && vain <= MAX_VAIN; k++) {
+    for (int k = 0; k < MAX_NEWTON && vain <= MAX_VAIN && w->effort < CRM_WORN; k++) {
         const carom_status e = crm_solve_run(w, s, c, 1);
         if (e < 0) return e;
         end_pose(w, s, c);
