@@ -374,9 +374,9 @@ static void no_tunnel(void **state)
     carom_world_destroy(w);
 }
 
-/* Twelve discs fall into a heap: certified, and nothing overlaps at the end of a step.  Contacts only
- * take energy, but the sub-step after an impact holds its rebound e u against gravity: m g h e u too
- * much, with u <= g h where a disc bounces again and again. */
+/* Twelve discs fall into a heap: certified, and nothing overlaps at the end of a step.  Contacts
+ * only take energy, but the sub-step after an impact holds its rebound e u against gravity: m g h e
+ * u too much, with u <= g h where a disc bounces again and again. */
 static void many_discs_settle(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-/* Error against run time: carom's integrators and orders beside Box2D 2.4 and Chipmunk 7 where these
- * are installed, same scenes, same run, one thread.
+/* Error against run time: carom's integrators and orders beside Box2D 2.4 and Chipmunk 7 where
+ * these are installed, same scenes, same run, one thread.
  *
  * Usage: bench_precision [scene]: a number from 0; prints CSV: scene, contender, steps per second,
  * error [m], processor seconds per simulated second, worst status.  The error is that of one body's

@@ -21,8 +21,8 @@ static scene make(const char *name)
 static int disc(scene *s, double r, double x, double y, double friction, double restitution)
 {
     const double m = PI * r * r;
-    const scene_body b = {
-        1, SHAPE_DISC, r, r, {0, x, y}, {0, 0, 0}, m, 0.5 * m * r * r, friction, restitution};
+    const scene_body b = {1, SHAPE_DISC,      r,        r,          {0, x, y}, {0, 0, 0},
+                          m, 0.5 * m * r * r, friction, restitution};
     s->bodies[s->n_bodies] = b;
     return s->n_bodies++;
 }
@@ -30,8 +30,9 @@ static int disc(scene *s, double r, double x, double y, double friction, double 
 static int box(scene *s, double hx, double hy, double angle, double x, double y, double friction)
 {
     const double m = 4 * hx * hy;
-    const scene_body b = {1,         SHAPE_BOX, hx, hy, {angle, x, y},
-                          {0, 0, 0}, m,         m * (hx * hx + hy * hy) / 3, friction, 0};
+    const scene_body b = {
+        1,        SHAPE_BOX, hx, hy, {angle, x, y}, {0, 0, 0}, m, m * (hx * hx + hy * hy) / 3,
+        friction, 0};
     s->bodies[s->n_bodies] = b;
     return s->n_bodies++;
 }
@@ -107,7 +108,8 @@ static problem bounce(void)
     return p;
 }
 
-/* A disc meets the floor without gravity and sticks to it: v_t = 2/3 of before, v_n = -e of before. */
+/* A disc meets the floor without gravity and sticks to it: v_t = 2/3 of before, v_n = -e of before.
+ */
 static problem oblique_impact(void)
 {
     problem p = {"oblique impact", make("oblique"), 1.0, 1, 0.5, 0, {0}};

@@ -31,7 +31,7 @@ typedef struct crm_scene {
     crm_scene_body *bodies;
     int n_joints;
     carom_joint_def *joints; /* at the initial poses */
-    json_t *json; /* what the views point into */
+    json_t *json;            /* what the views point into */
 } crm_scene;
 
 /* Reads problems->file.  NULL when anything is wrong: every fault is then in problems. */

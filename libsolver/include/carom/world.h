@@ -147,20 +147,20 @@ typedef struct carom_joint_def {
     double upper; /* its way along the axis [m], prismatic and wheel; the distance [m], rope */
     double restitution; /* at the limits [1], 0 to 1 */
     /* A spring on what the limits are about, and on both directions of a target. */
-    double stiffness;   /* [N/m], [N m/rad]; 0: none */
-    double damping;     /* [N s/m], [N m s/rad] */
-    double rest;        /* turn or way from now on, or distance, without force [rad, m] */
+    double stiffness; /* [N/m], [N m/rad]; 0: none */
+    double damping;   /* [N s/m], [N m s/rad] */
+    double rest;      /* turn or way from now on, or distance, without force [rad, m] */
     /* A motor on the turn of B (revolute, wheel) or its way along the axis (prismatic). */
     double motor_speed; /* [rad/s], [m/s] */
     double motor_limit; /* largest torque or force [N m, N]; 0: no motor */
     int collide;        /* 1: the two bodies may touch each other */
 } carom_joint_def;
 
-/* Bodies -1 (to be given), points at the origin, axis (1, 0), no limits, spring or motor; only bodies
- * joined by a distance, rope, target or lock collide. */
+/* Bodies -1 (to be given), points at the origin, axis (1, 0), no limits, spring or motor; only
+ * bodies joined by a distance, rope, target or lock collide. */
 CAROM_API carom_joint_def carom_joint_defaults(carom_joint_kind kind);
-/* "revolute", "prismatic", "weld", "wheel", "distance", "rope", "target", "lock_x", "lock_y", "lock_angle";
- * NULL for any other number. */
+/* "revolute", "prismatic", "weld", "wheel", "distance", "rope", "target", "lock_x", "lock_y",
+ * "lock_angle"; NULL for any other number. */
 CAROM_API const char *carom_joint_kind_name(carom_joint_kind kind);
 /* Adds a joint; *index (may be NULL) is its number.  CAROM_E_ARGUMENT, CAROM_E_MEMORY;
  * CAROM_E_STATE once the world is sealed. */
