@@ -220,6 +220,7 @@ carom_status crm_locate_change(carom_world *w, double left)
     int found = 0;
     if (s->map != CRM_MAP_EXTRAPOLATED || !s->n_contacts) return CAROM_OK;
     if (s->n_contacts > w->n_bodies) return CAROM_OK; /* a crowd: no room for margins */
+    if (w->island->n_driven) return CAROM_OK; /* springs and motors are not among its forces */
     const int opens = s->finest || lets_go(s);
     int any = 0;
     carom_status e = opens ? CAROM_OK : overdue(w, &any);
