@@ -226,12 +226,10 @@ static void fixed(void **state)
     run_integrator(CAROM_FIXED);
 }
 
-/* Where steps end, a gradient of them exists, and it is finite; but where light links between heavy
- * ones turn so far that the passes of stage 1 find no end: that is said, and rare. */
+/* Where steps end, a gradient of them exists, and it is finite. */
 static void gradients(void **state)
 {
     (void)state;
-    int refused = 0;
     if (only >= 0 && only != CAROM_LOCATED) return;
     for (uint64_t seed = first_seed;
          seed < first_seed + (uint64_t)(n_scenes < 100 ? n_scenes : 100); seed++) {
@@ -250,15 +248,11 @@ static void gradients(void **state)
         carom_gradient g = {0};
         g.q0 = q0;
         const carom_status e = carom_tape_gradient(tape, 1, &bar, &g, NULL);
-        if (e < 0 && e != CAROM_E_NO_SOLUTION) {
-            fail_msg("seed %llu: %s", (unsigned long long)seed, carom_status_name(e));
-        }
-        refused += e < 0;
-        for (int k = 0; e >= 0 && k < 3 * s.n_bodies; k++) assert_true(isfinite(q0[k]));
+        if (e < 0) fail_msg("seed %llu: %s", (unsigned long long)seed, carom_status_name(e));
+        for (int k = 0; k < 3 * s.n_bodies; k++) assert_true(isfinite(q0[k]));
         carom_tape_destroy(tape);
         carom_world_destroy(s.world);
     }
-    assert_in_range(refused, 0, 2);
 }
 
 int main(int argc, char **argv)
