@@ -67,6 +67,26 @@ static void spread(const crm_island *s, int k, double factor, double qn, double 
     if (sticks(s, k)) crm_add(z, c->t, c->a, c->b, factor * qt);
 }
 
+/* Row defects that are rounding of their own terms become zero: divided by the compliance they
+ * would make q noisy where rows depend on each other. */
+static double past_rounding(const double *row, int a, int b, const double *p, double defect)
+{
+    double size = 0;
+    for (int i = 0; a >= 0 && i < 3; i++) size += fabs(row[i] * p[3 * a + i]);
+    for (int i = 0; b >= 0 && i < 3; i++) size += fabs(row[3 + i] * p[3 * b + i]);
+    return fabs(defect) <= CRM_ROUNDING * size ? 0 : defect;
+}
+
+static void row_defects(crm_island *s, int k)
+{
+    const crm_contact *c = &s->contact[k];
+    double *n = &s->rhs.n[k];
+    double *t = &s->rhs.t[k];
+    project(s, k, s->x.z, n, t);
+    *n = past_rounding(c->n, c->a, c->b, s->x.z, *n);
+    *t = past_rounding(c->t, c->a, c->b, s->x.z, *t);
+}
+
 /* What is left of p + C' q = g, B' p = 0 at s->x, into s->rhs; returns its largest entry. */
 static double find_defect(crm_island *s, const double *g)
 {
@@ -75,7 +95,7 @@ static double find_defect(crm_island *s, const double *g)
     for (int i = 0; i < 3 * s->nb; i++) z[i] = g[i] - s->x.z[i];
     for (int k = 0; k < s->nc; k++) {
         spread(s, k, -1, s->x.n[k], s->x.t[k], z);
-        project(s, k, s->x.z, &s->rhs.n[k], &s->rhs.t[k]);
+        row_defects(s, k);
         e = fmax(e, fmax(fabs(s->rhs.n[k]), fabs(s->rhs.t[k])));
     }
     for (int q = 0; q < s->ng; q++) {
@@ -107,9 +127,7 @@ static void improve(crm_island *s, double compliance)
     crm_vec_add(s, s->x, 1, s->step);
 }
 
-/* Scaled adjoint of an island: p in s->x.z, q in s->x.n, s->x.t and behind the bodies.  `extra`
- * passes follow the one that reached rounding of g. */
-static void solve_scaled(crm_island *s, const double *g, int extra)
+void crm_island_adjoint(crm_island *s, const double *g, int extra)
 {
     double size = 0;
     double last = HUGE_VAL;
@@ -162,7 +180,7 @@ static void solve_island(carom_contact_solver *c, const carom_contact_problem *p
     const double *root = y->root + 3 * g->node_ptr[island];
     const int *body_of = g->body_of + g->node_ptr[island];
     for (int i = 0; i < 3 * s.nb; i++) bar[i] = root[i] * v_bar[3 * body_of[i / 3] + i % 3];
-    solve_scaled(&s, bar, extra);
+    crm_island_adjoint(&s, bar, extra);
     for (int i = 0; i < 3 * s.nb; i++) {
         if (root[i] > 0) a->p[3 * body_of[i / 3] + i % 3] = s.x.z[i] / root[i];
     }

@@ -15,7 +15,11 @@ typedef struct tangent {
     double *rt;
     double *re;     /* n_joint_rows */
     double *change; /* 3 n_bodies: dB l */
+    double *spare;  /* 3 n_bodies */
 } tangent;
+
+/* Rows that are missed by more are at odds [largest constant]. */
+static const double AT_ODDS = 1e-10;
 
 static tangent carve(double *scratch, const carom_contact_problem *p)
 {
@@ -25,6 +29,7 @@ static tangent carve(double *scratch, const carom_contact_problem *p)
     t.rt = t.rn + p->n_contacts;
     t.re = t.rt + p->n_contacts;
     t.change = t.re + p->n_joint_rows;
+    t.spare = t.change + 3 * p->n_bodies;
     return t;
 }
 
@@ -125,6 +130,57 @@ static double set_constants(crm_system *y, const crm_graph *g, int island, const
     return size;
 }
 
+/* Largest miss of the rows at s->x. */
+static double row_miss(const crm_island *s)
+{
+    double miss = 0;
+    for (int k = 0; k < s->nc; k++) {
+        const crm_contact *c = &s->contact[k];
+        if (s->mode[k] == CAROM_SEPARATED) continue;
+        miss = fmax(miss, fabs(c->cn + crm_dot(c->n, c->a, c->b, s->x.z)));
+        if (s->mode[k] != CAROM_STICK || !(c->mu > 0)) continue;
+        miss = fmax(miss, fabs(c->ct + crm_dot(c->t, c->a, c->b, s->x.z)));
+    }
+    for (int q = 0; q < s->ng; q++) {
+        const crm_group *g = &s->group[q];
+        for (int r = 0; r < CRM_GROUP_ROWS; r++) {
+            miss = fmax(miss, fabs(g->c[r] + crm_dot(g->j[r], g->a, g->b, s->x.z)));
+        }
+    }
+    return miss;
+}
+
+/* <q, c> of the adjoint in s->x. */
+static double answer(const crm_island *s)
+{
+    double sum = 0;
+    for (int k = 0; k < s->nc; k++) {
+        if (s->mode[k] == CAROM_SEPARATED) continue;
+        sum += s->x.n[k] * s->contact[k].cn;
+        if (s->mode[k] == CAROM_STICK && s->contact[k].mu > 0) {
+            sum += s->x.t[k] * s->contact[k].ct;
+        }
+    }
+    for (int i = 0; i < CRM_GROUP_ROWS * s->ng; i++) {
+        sum += s->x.z[3 * s->nb + i] * s->group[i / CRM_GROUP_ROWS].c[i % CRM_GROUP_ROWS];
+    }
+    return sum;
+}
+
+/* Where more rows than there are freedoms are asked for motions at odds, as when two contacts of a
+ * face stick and turn, multipliers grow without end and their rounding spoils the motion.  The
+ * adjoint has no such rows: the motion then is its transpose, entry by entry, -<q_i, c>. */
+static void transpose_adjoint(crm_island *s, double *z, double *unit)
+{
+    for (int i = 0; i < 3 * s->nb; i++) unit[i] = 0;
+    for (int i = 0; i < 3 * s->nb; i++) {
+        unit[i] = 1;
+        crm_island_adjoint(s, unit, 0);
+        unit[i] = 0;
+        z[i] = -answer(s);
+    }
+}
+
 /* e += W B dl of one island. */
 static void solve_island(carom_contact_solver *c, const carom_contact_problem *p,
                          const unsigned char *mode, int island, tangent *t)
@@ -137,16 +193,21 @@ static void solve_island(carom_contact_solver *c, const carom_contact_problem *p
     crm_system_set_modes(g, &s, island, mode);
     crm_vec_zero(&s, s.x);
     crm_solve_modes(&s, CRM_PASSES);
+    double *z = s.x.z;
+    if (row_miss(&s) > AT_ODDS) {
+        z = t->change; /* as large, and used up */
+        transpose_adjoint(&s, z, t->spare);
+    }
     for (int i = 0; i < 3 * s.nb; i++) {
         const int node = g->node_ptr[island] + i / 3;
-        t->e[3 * g->body_of[node] + i % 3] += size * c->system.root[3 * node + i % 3] * s.x.z[i];
+        t->e[3 * g->body_of[node] + i % 3] += size * c->system.root[3 * node + i % 3] * z[i];
     }
 }
 
-/* 6 per body, 2 per contact, 1 per joint row. */
+/* 9 per body, 2 per contact, 1 per joint row. */
 static carom_status reserve_scratch(carom_contact_solver *c, const carom_contact_problem *p)
 {
-    const int n = 6 * p->n_bodies + 2 * p->n_contacts + p->n_joint_rows + 1;
+    const int n = 9 * p->n_bodies + 2 * p->n_contacts + p->n_joint_rows + 1;
     return crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, n, sizeof(double));
 }
 

@@ -164,3 +164,133 @@ void crm_motor_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int row
     crm_measure_vjp(j, m, s->q0, row_bar, -ce_bar / s->h, q0_bar, &bar);
     if (with_parameters) crm_joint_give(r, joint, &bar);
 }
+
+/* --- forward: the transposes of the above ------------------------------------------------------
+ */
+
+/* Of u += b W J' of one row. */
+static void push_jvp(crm_forward *f, const crm_joint *j, const double row[6],
+                     const double row_dot[6], double b, double b_dot)
+{
+    const carom_world *w = f->world;
+    const int ends[2] = {j->body_a, j->body_b};
+    for (int k = 0; k < 6; k++) {
+        const int i = crm_unknown(w, ends[k / 3]);
+        if (i < 0) continue;
+        const int at = 3 * i + k % 3;
+        const double W = w->rows.inv_mass[at];
+        f->dot.u[at] += b * (f->dot.inv_mass[at] * row[k] + W * row_dot[k]) + b_dot * W * row[k];
+    }
+}
+
+/* Of weight = n J W J'. */
+static double weight_jvp(const crm_forward *f, const crm_joint *j, const double row[6],
+                         const double row_dot[6])
+{
+    const carom_world *w = f->world;
+    const int ends[2] = {j->body_a, j->body_b};
+    double sum = 0;
+    for (int k = 0; k < 6; k++) {
+        const int i = crm_unknown(w, ends[k / 3]);
+        if (i < 0) continue;
+        const int at = 3 * i + k % 3;
+        const double n = w->bodies[ends[k / 3]].n_springs;
+        sum += n * row[k] * (2 * w->rows.inv_mass[at] * row_dot[k] + f->dot.inv_mass[at] * row[k]);
+    }
+    return sum;
+}
+
+/* Of speed = J v with the velocity that the spring sees. */
+static double speed_jvp(const crm_substep *s, const crm_solve *c, const crm_joint *j,
+                        const double row[6], const double row_dot[6], const crm_line *line)
+{
+    const int late = c->kind == CRM_STAGE_2;
+    double sum = 0;
+    for (int k = 0; k < 6; k++) {
+        const int at = 3 * (k < 3 ? j->body_a : j->body_b) + k % 3;
+        const double seen = late ? 2 * line->v[at] - line->v0[at] : line->v0[at];
+        sum += row_dot[k] * crm_seen_velocity(s, c, at) + row[k] * seen;
+    }
+    return sum;
+}
+
+static void spring_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, int joint,
+                       crm_measure m, const crm_line *line)
+{
+    const crm_joint *j = &f->world->joints[joint];
+    const carom_gradient *by = line->by;
+    const double lever = m == CRM_TURN ? j->lever : 1;
+    const double dt = f->world->settings.dt;
+    const double dt_dot = crm_entry(by->dt, 0);
+    const crm_push p = crm_spring_push(f->world, s, c, j, m);
+    double row[6];
+    const double way = crm_measure_jvp(f->world, joint, m, c->q, line->q, by, row) -
+                       lever * crm_entry(by->rest, joint);
+    const double weight = weight_jvp(f, j, p.row, row);
+    const double speed = speed_jvp(s, c, j, p.row, row, line);
+    const double kt = 0.5 * dt * dt * p.weight;
+    const double kt_dot = dt * dt_dot * p.weight + 0.5 * dt * dt * weight;
+    const double wt_dot = dt_dot * p.weight + dt * weight;
+    const double k =
+        crm_soften_slope(p.stiffness, kt) * crm_entry(by->stiffness, joint) / (lever * lever) -
+        by_times(p.stiffness, kt) * kt_dot;
+    const double d = crm_soften_slope(p.damping, dt * p.weight) * crm_entry(by->damping, joint) /
+                         (lever * lever) -
+                     by_times(p.damping, dt * p.weight) * wt_dot;
+    const double force = -(k * p.way + p.k * way + d * p.speed + p.d * speed);
+    push_jvp(f, j, p.row, row, p.share * p.h * p.force,
+             p.share * (line->h * p.force + p.h * force));
+}
+
+static void motor_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, int joint, int at,
+                      const crm_line *line)
+{
+    const crm_joint *j = &f->world->joints[joint];
+    const crm_measure m = crm_motor_measure(j->kind);
+    const double lever = m == CRM_TURN ? j->lever : 1;
+    double row[6];
+    double je[6];
+    crm_measure_jvp(f->world, joint, m, c->q, line->q, line->by, row);
+    if (c->motor[at] == CRM_MOTOR_HOLDS) {
+        memcpy(&f->dot.je[6 * at], row, sizeof row);
+        f->dot.ce[at] = -lever * crm_entry(line->by->motor_speed, joint);
+        return;
+    }
+    const double b = crm_motor_impulse(s, c, j, at);
+    crm_measure_at(j, m, c->q, je);
+    push_jvp(f, j, je, row, b,
+             b * (line->h / s->h + crm_entry(line->by->motor_limit, joint) / j->motor_limit));
+}
+
+void crm_drive_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, const crm_line *line)
+{
+    const carom_world *w = f->world;
+    int first = 0;
+    for (int k = 0; w->island->n_driven && k < w->island->n_joints; k++) {
+        const int joint = w->island->joints[k];
+        const crm_joint *j = &w->joints[joint];
+        crm_measure measures[2];
+        const int springs = j->stiffness > 0 || j->damping > 0;
+        const int n = springs ? crm_spring_measures(j->kind, measures) : 0;
+        for (int i = 0; i < n; i++) spring_jvp(f, s, c, joint, measures[i], line);
+        if (j->n_rows > j->n_held) motor_jvp(f, s, c, joint, first + j->n_held, line);
+        first += j->n_rows;
+    }
+}
+
+double crm_motor_side_jvp(const crm_forward *f, const crm_substep *s, int joint, int row,
+                          const crm_line *line)
+{
+    const carom_world *w = f->world;
+    const crm_joint *j = &w->joints[joint];
+    const crm_measure m = crm_motor_measure(j->kind);
+    double je[6];
+    double je_dot[6];
+    double end[6];
+    if (s->solve[0].motor[row] != CRM_MOTOR_HOLDS) return 0;
+    const double way = crm_measure_at(j, m, f->pose, end) - crm_measure_at(j, m, s->q0, je);
+    const double after = crm_measure_jvp(w, joint, m, f->pose, f->pose_dot, line->by, end);
+    const double before = crm_measure_jvp(w, joint, m, s->q0, line->q, line->by, je_dot);
+    return (after - before) / s->h - way * line->h / (s->h * s->h) -
+           crm_row_dot(je_dot, s->solve[0].v, j->body_a, j->body_b);
+}

@@ -57,7 +57,7 @@ static carom_status column_vjp(crm_reverse *r, int n, int last, int with_paramet
 {
     for (int k = last; k > last - n; k--) {
         double inner_bar;
-        crm_unpack(r, &r->tape->records[k], &r->inner);
+        crm_unpack(r->world, &r->tape->records[k], r->moved, &r->inner);
         const carom_status e =
             crm_smooth_vjp(r, &r->inner.s, r->column_q, r->column_v, with_parameters, &inner_bar);
         if (e < 0) return e;
@@ -97,4 +97,79 @@ carom_status crm_extrapolated_vjp(crm_reverse *r, crm_substep *s, double *q_bar,
         v_bar[k] += r->start_v[k];
     }
     return CAROM_OK;
+}
+
+/* --- forward: the transposes of the above ------------------------------------------------------
+ */
+
+static carom_status hold_jvp(crm_forward *f, crm_substep *s, const crm_solve *c, int n)
+{
+    const carom_world *w = f->world;
+    const int poses = c->kind == CRM_HOLD;
+    crm_begin_solve(f, s, c);
+    for (int i = 0; i < n; i++) {
+        crm_line *line = &f->lines[i];
+        crm_rows_jvp(f, s, c, line);
+        for (int k = 0; poses && k < s->n_contacts; k++) {
+            f->dot.cn[k] = f->gap[k];
+            if (!(w->rows.mu[k] > 0)) continue; /* crm_hold_problem has chosen */
+            f->dot.ct[k] =
+                crm_slip_jvp(w, &s->moved[k], s->q0, c->q, line->start_q, line->q, line->by);
+        }
+        for (int k = 0; poses && k < w->island->n_rows; k++) f->dot.ce[k] = f->error[k];
+        if (!poses) crm_gather(w, line->v, f->dot.u);
+        const carom_status e = crm_solve_jvp(f, poses ? f->pose_dot : line->v);
+        if (e < 0) return e;
+        if (poses) add(w, line->q, f->pose_dot, 1);
+    }
+    return CAROM_OK;
+}
+
+/* Column n, whose first inner record is `first`: its part of the sums. */
+static carom_status column_jvp(crm_forward *f, int n, int first, double weight, int n_lines)
+{
+    const carom_world *w = f->world;
+    for (int i = 0; i < n_lines; i++) {
+        crm_line *line = &f->lines[i];
+        crm_copy(w, line->q, line->start_q);
+        crm_copy(w, line->v, line->start_v);
+        line->h /= n;
+    }
+    carom_status e = CAROM_OK;
+    for (int k = first; e >= 0 && k < first + n; k++) {
+        crm_unpack(f->world, &f->tape->records[k], f->moved, &f->inner);
+        e = crm_smooth_jvp(f, &f->inner.s, n_lines);
+    }
+    for (int i = 0; i < n_lines; i++) {
+        crm_line *line = &f->lines[i];
+        add(w, line->sum_q, line->q, weight);
+        add(w, line->sum_v, line->v, weight);
+        line->h *= n;
+    }
+    return e;
+}
+
+carom_status crm_extrapolated_jvp(crm_forward *f, crm_substep *s, int n)
+{
+    const carom_world *w = f->world;
+    const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
+    const int first = f->record - s->n_inner;
+    carom_status e = CAROM_OK;
+    for (int i = 0; i < n; i++) {
+        crm_line *line = &f->lines[i];
+        memcpy(line->start_q, line->q, bytes);
+        memcpy(line->start_v, line->v, bytes);
+        crm_zero(w, line->sum_q);
+        crm_zero(w, line->sum_v);
+    }
+    for (int k = 1; e >= 0 && k * (k - 1) / 2 < s->n_inner; k++) {
+        if (s->weight[k - 1] == 0) continue;
+        e = column_jvp(f, k, first + k * (k - 1) / 2, s->weight[k - 1], n);
+    }
+    for (int i = 0; i < n; i++) {
+        crm_copy(w, f->lines[i].q, f->lines[i].sum_q);
+        crm_copy(w, f->lines[i].v, f->lines[i].sum_v);
+    }
+    for (int k = 2; e >= 0 && k < s->n_solves; k++) e = hold_jvp(f, s, &s->solve[k], n);
+    return e;
 }

@@ -1,25 +1,11 @@
 /* gradient.c: the reverse pass over a tape: events, step borders, losses.  docs/gradient.md. */
 #include "grad/internal.h"
-#include "world/block.h"
 
 #include <math.h>
-
-/* An event whose gap closes slower than this [1/s of L] has no usable derivative of its time. */
-static const double GRAZING = 1e-9;
 
 /* A cotangent below this is dropped [largest seed]: at rest it shrinks by 1e-9 a sub-step, and
  * numbers that have lost their normal form make every product slow. */
 static const double NEGLIGIBLE = 1e-200;
-
-static void lay_unpacked(crm_unpacked *u, crm_block *b, size_t n3)
-{
-    double **const states[] = {&u->q0, &u->v0, &u->q1, &u->v1};
-    for (int k = 0; k < 4; k++) *states[k] = crm_carve(b, n3, sizeof(double));
-    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
-        u->solve_q[k] = crm_carve(b, n3, sizeof(double));
-        u->solve_v[k] = crm_carve(b, n3, sizeof(double));
-    }
-}
 
 static void lay(crm_reverse *r, crm_block *b, size_t m)
 {
@@ -33,8 +19,8 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     for (size_t k = 0; k < sizeof full / sizeof *full; k++) {
         *full[k] = crm_carve(b, n3, sizeof(double));
     }
-    lay_unpacked(&r->work, b, n3);
-    if (r->world->settings.order > 2) lay_unpacked(&r->inner, b, n3);
+    crm_lay_unpacked(&r->work, b, n3);
+    if (r->world->settings.order > 2) crm_lay_unpacked(&r->inner, b, n3);
     r->clock_bar = crm_carve(b, (size_t)r->world->n_bodies, sizeof(double));
     r->clock_old = crm_carve(b, (size_t)r->world->n_bodies, sizeof(double));
     r->velocity_bar = crm_carve(b, k3, sizeof(double));
@@ -74,30 +60,10 @@ static void clear(double *x, size_t n)
 
 static void clear_sink(const crm_reverse *r)
 {
-    const carom_gradient *g = &r->sink.g;
-    const carom_world *w = r->world;
-    const size_t n = (size_t)w->n_bodies;
-    clear(g->mass, n);
-    clear(g->inertia, n);
-    clear(g->friction, n);
-    clear(g->restitution, n);
-    clear(g->gravity, 2);
-    clear(g->force, 3 * n);
-    clear(g->force_steps, 3 * n * (size_t)r->tape->n_frames);
-    clear(g->dt, 1);
-    clear(g->radius, (size_t)w->n_shapes);
-    clear((double *)g->vertices, 2 * (size_t)w->n_vertices);
-    clear((double *)g->anchors, 4 * (size_t)w->n_joints);
-    clear(g->axes, (size_t)w->n_joints);
-    clear(g->angles, (size_t)w->n_joints);
-    clear(g->lengths, (size_t)w->n_joints);
-    clear(g->lower, (size_t)w->n_joints);
-    clear(g->upper, (size_t)w->n_joints);
-    clear(g->stiffness, (size_t)w->n_joints);
-    clear(g->damping, (size_t)w->n_joints);
-    clear(g->rest, (size_t)w->n_joints);
-    clear(g->motor_speed, (size_t)w->n_joints);
-    clear(g->motor_limit, (size_t)w->n_joints);
+    const int n_frames = r->to - r->from;
+    for (int k = 0; k < CRM_N_ARRAYS; k++) {
+        clear(crm_array(&r->sink.g, k), crm_array_size(r->world, n_frames, k));
+    }
 }
 
 static void drop_negligible(const carom_world *w, double *x, double scale)
@@ -108,35 +74,6 @@ static void drop_negligible(const carom_world *w, double *x, double scale)
             if (fabs(y[k]) < NEGLIGIBLE * scale) y[k] = 0;
         }
     }
-}
-
-static void scatter(const crm_island *i, const double *from, double *to)
-{
-    for (int k = 0; k < i->n_bodies; k++) {
-        memcpy(&to[3 * i->bodies[k]], &from[3 * k], 3 * sizeof *to);
-    }
-}
-
-void crm_unpack(crm_reverse *r, const crm_record *record, crm_unpacked *to)
-{
-    const crm_island *i = &record->island;
-    crm_substep *s = &to->s;
-    *s = record->s;
-    s->moved = r->moved;
-    s->q0 = to->q0;
-    s->v0 = to->v0;
-    s->q1 = to->q1;
-    s->v1 = to->v1;
-    scatter(i, record->s.q0, s->q0);
-    scatter(i, record->s.v0, s->v0);
-    for (int k = 0; k < s->n_solves; k++) {
-        const crm_solve *c = &record->s.solve[k];
-        s->solve[k].q = c->q ? to->solve_q[k] : s->q0;
-        s->solve[k].v = to->solve_v[k];
-        if (c->q) scatter(i, c->q, s->solve[k].q);
-        scatter(i, c->v, s->solve[k].v);
-    }
-    crm_enter(r->world, i);
 }
 
 /* The indicator g whose root ended the sub-step: the gap of its contact, or Jt v1.  Adds the
@@ -169,7 +106,6 @@ static void event_vjp(crm_reverse *r, const crm_substep *s, double scale, double
 static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar)
 {
     const carom_world *w = r->world;
-    const double least = GRAZING * (s->end == CRM_END_STOP ? w->speed : w->length);
     double h_bar;
     double slope;
     crm_copy(w, r->q_seed, r->q_bar);
@@ -181,7 +117,7 @@ static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar)
     event_vjp(r, s, 1, r->q_seed, r->v_seed, 0);
     e = crm_substep_vjp(r, s, r->q_seed, r->v_seed, 0, &slope);
     if (e < 0) return e;
-    if (fabs(slope) <= least) {
+    if (fabs(slope) <= crm_grazing(w, s)) {
         r->stats.degenerate++;
         return CAROM_OK;
     }
@@ -195,7 +131,7 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
     crm_substep *s = &r->work.s;
     double h_bar;
     r->record = record;
-    crm_unpack(r, &r->tape->records[record], &r->work);
+    crm_unpack(r->world, &r->tape->records[record], r->moved, &r->work);
     crm_copy(r->world, s->q1, r->q_after);
     crm_copy(r->world, s->v1, r->v_after);
     if (s->end == CRM_END_EVENT || s->end == CRM_END_STOP) {
@@ -226,20 +162,16 @@ static void add_bars(crm_reverse *r, int step, int n_bars, const carom_state_bar
     const carom_tape *t = r->tape;
     const carom_world *w = r->world;
     const double *v = carom_tape_v(t, step);
-    const double *f = step > 0 ? t->frames[step - 1].force : NULL;
     for (int i = 0; i < n_bars; i++) {
         if (bars[i].step != step) continue;
         for (int k = 0; k < 3 * w->n_bodies; k++) {
             const int b = k / 3;
-            const int falls = w->bodies[b].type == CAROM_DYNAMIC;
-            const double W = !falls ? 0 : k % 3 ? 1 / w->mass[b] : 1 / w->inertia[b];
-            const double g = falls && k % 3 ? w->settings.gravity[k % 3 - 1] : 0;
             const double q_bar = bars[i].q ? bars[i].q[k] : 0;
             const double v_bar = bars[i].v ? bars[i].v[k] : 0;
             r->scale = fmax(r->scale, fmax(fabs(q_bar), fabs(v_bar)));
             r->q_bar[k] += q_bar;
             r->v_bar[k] += v_bar;
-            r->clock_bar[b] += q_bar * v[k] + v_bar * (f ? W * f[k] + g : 0);
+            r->clock_bar[b] += q_bar * v[k] + v_bar * crm_border_acceleration(t, step, k);
         }
     }
 }
@@ -265,11 +197,11 @@ static carom_status reverse_frame(crm_reverse *r, int frame)
 {
     const carom_tape *t = r->tape;
     const int first = t->frames[frame].first_record;
-    const int more = frame + 1 < t->n_frames && crm_segment(t, frame + 1) == t->held;
-    const int end = more ? t->frames[frame + 1].first_record : t->n_records;
+    const int end = crm_frame_end(t, frame);
     const int before = r->stats.degenerate;
     double *steps = r->sink.g.force_steps;
-    r->sink.force_step = steps ? steps + 3 * (size_t)r->world->n_bodies * (size_t)frame : NULL;
+    if (steps) steps += 3 * (size_t)r->world->n_bodies * (size_t)(frame - r->from);
+    r->sink.force_step = steps;
     const crm_record *records = t->records;
     double left_bar = 0;
     clear(r->clock_old, (size_t)r->world->n_bodies);
@@ -288,37 +220,30 @@ static carom_status reverse_frame(crm_reverse *r, int frame)
     return CAROM_OK;
 }
 
-static void place_statics(crm_unpacked *u, const double *q, size_t n3)
-{
-    memcpy(u->q0, q, n3 * sizeof *q);
-    memcpy(u->q1, q, n3 * sizeof *q);
-    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
-        memcpy(u->solve_q[k], q, n3 * sizeof *q);
-        clear(u->solve_v[k], n3);
-    }
-}
-
-static carom_status reverse_all(crm_reverse *r, int n_bars, const carom_state_bar *bars)
+static void start(crm_reverse *r)
 {
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
-    const carom_tape *t = r->tape;
-    memcpy(r->pose, t->q_end, n3 * sizeof(double));
-    memcpy(r->q_after, t->q_end, n3 * sizeof(double));
-    place_statics(&r->work, t->q_end, n3);
-    if (r->world->settings.order > 2) place_statics(&r->inner, t->q_end, n3);
-    memcpy(r->v_after, t->v_end, n3 * sizeof(double));
-    clear(r->clock_bar, (size_t)r->world->n_bodies);
-    clear(r->q_bar, n3);
-    clear(r->v_bar, n3);
+    const double *q = carom_tape_q(r->tape, r->to);
+    memcpy(r->pose, q, n3 * sizeof *q);
+    memcpy(r->q_after, q, n3 * sizeof *q);
+    memcpy(r->v_after, carom_tape_v(r->tape, r->to), n3 * sizeof *q);
+    crm_place_statics(&r->work, q, n3);
+    if (r->world->settings.order > 2) crm_place_statics(&r->inner, q, n3);
     clear_sink(r);
     r->stats.first_degenerate_step = -1;
-    for (int frame = r->tape->n_frames - 1; frame >= 0; frame--) {
+}
+
+static carom_status reverse_span(crm_reverse *r, int n_bars, const carom_state_bar *bars)
+{
+    const size_t n3 = 3 * (size_t)r->world->n_bodies;
+    start(r);
+    for (int frame = r->to - 1; frame >= r->from; frame--) {
         add_bars(r, frame + 1, n_bars, bars);
         carom_status e = crm_hold_segment(r->tape, frame);
         if (e >= 0) e = reverse_frame(r, frame);
         if (e < 0) return e;
     }
-    add_bars(r, 0, n_bars, bars);
+    add_bars(r, r->from, n_bars, bars);
     for (int b = 0; b < r->world->n_bodies; b++) {
         if (r->world->bodies[b].type == CAROM_STATIC) clear(&r->v_bar[3 * b], 3);
     }
@@ -331,16 +256,29 @@ static carom_status check(const carom_tape *t, int n_bars, const carom_state_bar
 {
     if (n_bars < 0 || (n_bars > 0 && !bars)) return CAROM_E_ARGUMENT;
     for (int i = 0; i < n_bars; i++) {
-        if (bars[i].step < 0 || bars[i].step > t->n_frames) {
-            return crm_world_fail(t->world, CAROM_E_ARGUMENT,
-                                  "loss at step %d, but the tape has %d steps", bars[i].step,
-                                  t->n_frames);
-        }
+        if (bars[i].step >= 0 && bars[i].step <= t->n_frames) continue;
+        return crm_world_fail(t->world, CAROM_E_ARGUMENT,
+                              "loss at step %d, but the tape has %d steps", bars[i].step,
+                              t->n_frames);
     }
-    if (t->revision != t->world->revision) {
-        return crm_world_fail(t->world, CAROM_E_STATE,
-                              "parameters changed since the recording; rewind and run again");
-    }
+    return crm_tape_current(t);
+}
+
+carom_status crm_gradient_span(carom_tape *t, int from, int to, int n_bars,
+                               const carom_state_bar *bars, const carom_gradient *gradient,
+                               carom_gradient_stats *stats)
+{
+    crm_reverse r = {0};
+    r.tape = t;
+    r.world = t->world;
+    r.sink.g = *gradient;
+    r.from = from;
+    r.to = to;
+    carom_status e = allocate(&r);
+    if (!e) e = reverse_span(&r, n_bars, bars);
+    crm_free(&t->memory, r.block, r.bytes, 1);
+    if (e < 0) return crm_world_fail(t->world, e, "gradient: %s", carom_status_text(e));
+    if (stats) *stats = r.stats;
     return CAROM_OK;
 }
 
@@ -348,16 +286,6 @@ carom_status carom_tape_gradient(carom_tape *tape, int n_bars, const carom_state
                                  const carom_gradient *gradient, carom_gradient_stats *stats)
 {
     if (!tape || !gradient) return CAROM_E_ARGUMENT;
-    carom_status e = check(tape, n_bars, bars);
-    if (e) return e;
-    crm_reverse r = {0};
-    r.tape = tape;
-    r.world = tape->world;
-    r.sink.g = *gradient;
-    e = allocate(&r);
-    if (!e) e = reverse_all(&r, n_bars, bars);
-    crm_free(&tape->memory, r.block, r.bytes, 1);
-    if (e < 0) return crm_world_fail(tape->world, e, "gradient: %s", carom_status_text(e));
-    if (stats) *stats = r.stats;
-    return CAROM_OK;
+    const carom_status e = check(tape, n_bars, bars);
+    return e ? e : crm_gradient_span(tape, 0, tape->n_frames, n_bars, bars, gradient, stats);
 }

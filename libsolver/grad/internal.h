@@ -3,6 +3,7 @@
 #define CRM_GRAD_INTERNAL_H
 
 #include "carom/grad.h"
+#include "world/block.h"
 #include "world/internal.h"
 
 /* One recorded sub-step: a crm_substep whose arrays lie in one block of exact size, states as three
@@ -11,6 +12,7 @@ typedef struct crm_record {
     crm_substep s;
     crm_island island; /* without pairs */
     int which;         /* number of the island in its frame */
+    int inner;         /* 1: of the extrapolated sub-step that follows */
     void *block;
     size_t bytes;
 } crm_record;
@@ -63,6 +65,13 @@ carom_status crm_checkpoint(carom_tape *t, int frame);
 carom_status crm_hold_segment(carom_tape *t, int frame);
 void crm_free_checkpoints(carom_tape *t);
 
+/* shared.c: the arrays of a gradient one by one: where array k is, NULL when not wanted, and how
+ * many numbers it has for so many steps. */
+enum { CRM_N_ARRAYS = 23 };
+double *crm_array(const carom_gradient *g, int k);
+void crm_set_array(carom_gradient *g, int k, double *p);
+size_t crm_array_size(const carom_world *w, int n_frames, int k);
+
 /* Cotangents of the parameters; NULL where not wanted. */
 typedef struct crm_sink {
     carom_gradient g;
@@ -81,6 +90,7 @@ typedef struct crm_reverse {
     carom_tape *tape;
     carom_world *world;
     crm_sink sink;
+    int from, to;          /* frames from .. to - 1 */
     double scale;          /* largest seed so far */
     double *q_bar, *v_bar; /* 3 n_bodies: state under way */
     double *q_seed, *v_seed;
@@ -106,8 +116,33 @@ typedef struct crm_reverse {
     carom_gradient_stats stats;
 } crm_reverse;
 
-/* gradient.c: the recorded sub-step into `to`; its island is entered. */
-void crm_unpack(crm_reverse *r, const crm_record *record, crm_unpacked *to);
+/* shared.c */
+void crm_lay_unpacked(crm_unpacked *u, crm_block *b, size_t n3);
+/* The static bodies of all states from q. */
+void crm_place_statics(crm_unpacked *u, const double *q, size_t n3);
+/* The recorded sub-step into `to`, but for its end; its island is entered.  moved: room for the
+ * contacts at the pose of a problem. */
+void crm_unpack(carom_world *w, const crm_record *record, crm_contact *moved, crm_unpacked *to);
+/* Three numbers per body, from world order to that of the island under way, and back. */
+void crm_gather(const carom_world *w, const double *full, double *moving);
+void crm_scatter(const carom_world *w, const double *moving, double *full);
+/* d l_t / d mu of a closed contact without friction, from the right: it would oppose the slip,
+ * l_t = -sign(u_t) mu l_n.  0 where it does not slip; rows of the solve in place. */
+double crm_first_friction(const carom_world *w, const crm_solve *c, int k, const crm_contact *x);
+/* Where the time of the event that ended a sub-step has no usable derivative [of dg/dh]. */
+double crm_grazing(const carom_world *w, const crm_substep *s);
+/* One behind the last record of a frame, whose segment is held. */
+int crm_frame_end(const carom_tape *t, int frame);
+/* W f + g of number k of a state after `step` steps, along which time owed there moves it. */
+double crm_border_acceleration(const carom_tape *t, int step, int k);
+/* CAROM_E_STATE, with a word, when parameters have changed since the recording. */
+carom_status crm_tape_current(const carom_tape *t);
+
+/* gradient.c: the reverse pass from the state after step `to` to that after step `from`; their
+ * forces are force_steps. */
+carom_status crm_gradient_span(carom_tape *t, int from, int to, int n_bars,
+                               const carom_state_bar *bars, const carom_gradient *gradient,
+                               carom_gradient_stats *stats);
 
 /* geometry.c: reverse derivatives of rows and gaps; each adds. */
 void crm_contact_rows_vjp(const crm_contact *c, const double jn_bar[6], const double jt_bar[6],
@@ -185,4 +220,127 @@ carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, doubl
                             int with_parameters);
 carom_status crm_substep_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
                              int with_parameters, double *h_bar);
+
+/* --- forward ------------------------------------------------------------------------------------
+ */
+
+/* One direction on its way: changes of the state and of what else moves. */
+typedef struct crm_line {
+    const carom_gradient *by;  /* parameters, read only */
+    double h;                  /* of the length of the sub-step */
+    double left;               /* of the time left to the island */
+    double *q, *v;             /* 3 n_bodies, like all below: of the state under way */
+    double *q0, *v0;           /* ... and of the start of the sub-step */
+    double *start_q, *start_v; /* of an extrapolated one, whose columns use the others */
+    double *sum_q, *sum_v;     /* of its columns, weighted */
+    double *clock, *clock_old; /* per body: of the time owed to the next step and to this one */
+} crm_line;
+
+/* Changes of the data of a contact problem: a carom_contact_direction that can be written. */
+typedef struct crm_problem_dot {
+    double *inv_mass, *u, *jn, *jt, *mu, *cn, *ct, *je, *ce;
+} crm_problem_dot;
+
+/* What the rows at the end of a stage 1 have more than those at its start, 6 numbers each: an
+ * iteration answers a change x of its velocity with right-hand sides that change by these times x.
+ */
+typedef struct crm_turn {
+    double *n, *t; /* per contact; 0 where there is no friction */
+    double *e;     /* per joint row */
+} crm_turn;
+/* smooth.c: of the stage 1 that ends at p, its rows in place. */
+void crm_turn_of_rows(const carom_world *w, const crm_substep *s, const double *p, crm_turn *turn);
+
+/* Workspace of a forward pass.  Lines share the factors of every problem. */
+typedef struct crm_forward {
+    carom_tape *tape;
+    carom_world *world;
+    int n;           /* lines */
+    crm_line *lines; /* n, and one that moves by h alone */
+    int from;        /* the frame that the pass begins with */
+    int frame;       /* under way */
+    int record;      /* under way */
+    crm_problem_dot dot;
+    crm_turn turn;
+    double *gap;             /* per contact: change of its gap at the pose of the rows */
+    double *error;           /* per joint row */
+    double *result;          /* 3 per body of the island: of the velocity of a solve */
+    double *pose, *pose_dot; /* 3 n_bodies: end of an iteration of stage 1 */
+    double *rest, *trial;    /* 3 n_bodies: what the passes of stage 1 give; 0 of static bodies */
+    carom_contact_problem problem;   /* of the solve under way */
+    carom_contact_solution solution; /* likewise */
+    crm_contact *moved;
+    crm_unpacked work, inner;
+    void *block;
+    size_t bytes;
+    carom_gradient_stats stats;
+} crm_forward;
+
+static inline double crm_entry(const double *array, int i)
+{
+    return array ? array[i] : 0;
+}
+
+/* Everything below changes the first n lines, or returns the change along one of them. */
+/* geometry.c */
+void crm_contact_rows_jvp(const crm_contact *c, const carom_contact_dot *dot, double jn[6],
+                          double jt[6]);
+carom_contact_dot crm_geometry_jvp(const carom_world *w, const double *q, const crm_contact *c,
+                                   const double *q_dot, const carom_gradient *by);
+/* Derivative of a slip by q1 of the bodies A and B. */
+void crm_slip_row(const carom_world *w, const crm_contact *c, const double *q1, double row[6]);
+double crm_slip_jvp(const carom_world *w, const crm_contact *c, const double *q0, const double *q1,
+                    const double *q0_dot, const double *q1_dot, const carom_gradient *by);
+
+/* joint.c */
+carom_vec2 crm_arm_jvp(double angle, carom_vec2 local, double angle_dot,
+                       const carom_vec2 *local_dot);
+double crm_measure_jvp(const carom_world *w, int joint, crm_measure m, const double *q,
+                       const double *q_dot, const carom_gradient *by, double row_dot[6]);
+carom_contact_dot crm_limit_jvp(const carom_world *w, const double *q, int limit,
+                                const double *q_dot, const carom_gradient *by);
+
+/* drive.c: after crm_rows_jvp; adds to dot.u, and sets rows and sides of motors. */
+void crm_drive_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, const crm_line *line);
+/* c_e of a motor that holds in an iteration of stage 1, which ends at f->pose, but for its speed.
+ */
+double crm_motor_side_jvp(const crm_forward *f, const crm_substep *s, int joint, int row,
+                          const crm_line *line);
+
+/* forward.c: the pieces of a sub-step. */
+/* Problem and solution of solve c of s, for all lines. */
+void crm_begin_solve(crm_forward *f, crm_substep *s, const crm_solve *c);
+/* Changes of rows, gaps, errors, friction and inverse masses of that problem, at c->q moved by
+ * line->q; right-hand sides do not change, and u by its first friction alone. */
+void crm_rows_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, const crm_line *line);
+/* dot.u += change of v + h (W f + g), v_dot that of v; share = dh / dstep. */
+void crm_free_velocity_jvp(crm_forward *f, const crm_substep *s, const crm_line *line,
+                           const double *v_dot, double h, double share);
+/* Of c_n = e u_n, or gap / h ahead. */
+void crm_targets_jvp(crm_forward *f, const crm_substep *s, const crm_line *line);
+/* Change of the solution along dot, of the island, to v_dot. */
+carom_status crm_solve_jvp(crm_forward *f, double *v_dot);
+/* The same along dot.cn, dot.ct and dot.ce alone. */
+carom_status crm_sides_jvp(crm_forward *f, double *v_dot);
+/* q1 = q0 + h v: q_dot += h v_dot + h_dot v. */
+void crm_move_jvp(const carom_world *w, const crm_substep *s, const double *v, double h_dot,
+                  const double *v_dot, double *q_dot);
+carom_status crm_correction_jvp(crm_forward *f, crm_substep *s, const crm_solve *c, int n);
+double crm_restitution_jvp(const carom_world *w, const crm_substep *s, const crm_contact *c,
+                           const carom_gradient *by);
+
+/* The maps, of the sub-step whose length changes by line->h. */
+carom_status crm_substep_jvp(crm_forward *f, crm_substep *s, int n);
+carom_status crm_smooth_jvp(crm_forward *f, crm_substep *s, int n);
+carom_status crm_extrapolated_jvp(crm_forward *f, crm_substep *s, int n);
+
+/* tangent.c: a pass from the state after `step` steps, frame by frame. */
+carom_status crm_forward_open(crm_forward *f, carom_tape *tape, int n,
+                              const carom_gradient *directions, int step);
+carom_status crm_forward_frame(crm_forward *f, int frame);
+/* The line's change of the state that the pass has come to, with what it owes to the next step,
+ * which moves it along (v, W f + g). */
+void crm_give_state(const crm_forward *f, const crm_line *line, const carom_state_dot *to);
+void crm_forward_close(crm_forward *f);
+
 #endif

@@ -161,3 +161,100 @@ void crm_limit_vjp(crm_reverse *r, const double *q, int limit, const carom_conta
     if (bound) bound[joint] -= value_bar * (m == CRM_TURN ? j->lever : 1);
     crm_joint_give(r, joint, &to);
 }
+
+/* --- forward: the transposes of the above ------------------------------------------------------
+ */
+
+carom_vec2 crm_arm_jvp(double angle, carom_vec2 local, double angle_dot,
+                       const carom_vec2 *local_dot)
+{
+    const carom_vec2 arm = crm_rotate(angle, local);
+    carom_vec2 dot = {-angle_dot * arm.y, angle_dot * arm.x};
+    if (local_dot) add(&dot, crm_rotate(angle, *local_dot), 1);
+    return dot;
+}
+
+/* Changes of what a measure and its row are made of; arm_a is the measure's arm on A. */
+typedef struct frame_dot {
+    carom_vec2 arm_a, arm_b, d, u;
+} frame_dot;
+
+static frame_dot frame_jvp(const crm_joint *j, int joint, crm_measure m, const double *q,
+                           const crm_joint_frame *f, carom_vec2 u, const double *q_dot,
+                           const carom_gradient *by)
+{
+    const carom_vec2 *local = by->anchors ? &by->anchors[2 * joint] : NULL;
+    const double *a = q_dot + 3 * j->body_a;
+    const double *b = q_dot + 3 * j->body_b;
+    const carom_vec2 normal = {-u.y, u.x};
+    frame_dot x = {{0, 0}, {0, 0}, {b[1] - a[1], b[2] - a[2]}, {0, 0}};
+    x.arm_a = crm_arm_jvp(q[3 * j->body_a], j->local_a, a[0], local);
+    x.arm_b = crm_arm_jvp(q[3 * j->body_b], j->local_b, b[0], local ? local + 1 : NULL);
+    add(&x.d, x.arm_b, 1);
+    add(&x.d, x.arm_a, -1);
+    const double length = hypot(f->d.x, f->d.y);
+    if (m == CRM_APART && length > 0) add(&x.u, normal, cross(u, x.d) / length);
+    if (m != CRM_ALONG && m != CRM_ASIDE) return x;
+    add(&x.u, normal, a[0] + crm_entry(by->axes, joint));
+    add(&x.arm_a, x.d, 1);
+    return x;
+}
+
+/* Of the measure, as made_vjp. */
+static double made_jvp(int joint, crm_measure m, const crm_joint_frame *f, carom_vec2 u,
+                       const frame_dot *x, const carom_gradient *by)
+{
+    const double along = u.x * x->d.x + u.y * x->d.y;
+    if (m == CRM_APART) return along - crm_entry(by->lengths, joint);
+    return along + x->u.x * f->d.x + x->u.y * f->d.y;
+}
+
+static double turn_jvp(const crm_joint *j, int joint, const double *q_dot, const carom_gradient *by)
+{
+    return j->lever *
+           ((q_dot[3 * j->body_b] - q_dot[3 * j->body_a]) - crm_entry(by->angles, joint));
+}
+
+double crm_measure_jvp(const carom_world *w, int joint, crm_measure m, const double *q,
+                       const double *q_dot, const carom_gradient *by, double row_dot[6])
+{
+    const crm_joint *j = &w->joints[joint];
+    memset(row_dot, 0, 6 * sizeof *row_dot);
+    if (m == CRM_TURN) return turn_jvp(j, joint, q_dot, by);
+    const crm_joint_frame f = crm_joint_frame_at(j, q);
+    const carom_vec2 u = crm_measure_direction(j, m, q, &f);
+    const carom_vec2 arm = crm_measure_arm(m, &f);
+    const frame_dot x = frame_jvp(j, joint, m, q, &f, u, q_dot, by);
+    row_dot[0] = -(cross(x.arm_a, u) + cross(arm, x.u));
+    row_dot[1] = -x.u.x;
+    row_dot[2] = -x.u.y;
+    row_dot[3] = cross(x.arm_b, u) + cross(f.arm_b, x.u);
+    row_dot[4] = x.u.x;
+    row_dot[5] = x.u.y;
+    return made_jvp(joint, m, &f, u, &x, by);
+}
+
+carom_contact_dot crm_limit_jvp(const carom_world *w, const double *q, int limit,
+                                const double *q_dot, const carom_gradient *by)
+{
+    const int joint = crm_limit_joint(limit);
+    const crm_joint *j = &w->joints[joint];
+    const crm_measure m = crm_limit_measure(j->kind);
+    const double sign = crm_limit_sign(limit);
+    const double lever = m == CRM_TURN ? j->lever : 1;
+    carom_contact_dot dot = {{0, 0}, {0, 0}, {0, 0}, 0};
+    double value;
+    if (m == CRM_TURN) {
+        value = turn_jvp(j, joint, q_dot, by);
+    } else {
+        const crm_joint_frame f = crm_joint_frame_at(j, q);
+        const carom_vec2 u = crm_measure_direction(j, m, q, &f);
+        const frame_dot x = frame_jvp(j, joint, m, q, &f, u, q_dot, by);
+        value = made_jvp(joint, m, &f, u, &x, by);
+        add(&dot.normal, x.u, sign);
+        dot.arm_a = x.arm_a;
+        dot.arm_b = x.arm_b;
+    }
+    dot.gap = sign * (value - lever * crm_entry(sign > 0 ? by->lower : by->upper, joint));
+    return dot;
+}

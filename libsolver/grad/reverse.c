@@ -3,27 +3,20 @@
 
 #include <math.h>
 
-static void gather(const carom_world *w, const double *full, double *moving)
-{
-    for (int i = 0; i < w->island->n_bodies; i++) {
-        memcpy(&moving[3 * i], &full[3 * w->island->bodies[i]], 3 * sizeof(double));
-    }
-}
-
 carom_status crm_solve_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, const double *v_bar)
 {
     carom_world *w = r->world;
     const carom_contact_problem p = crm_solve_problem(w, s, c);
     if (!p.n_contacts && !p.n_joint_rows) {
-        gather(w, v_bar, r->bars.u);
+        crm_gather(w, v_bar, r->bars.u);
         memset(r->bars.inv_mass, 0, 3 * (size_t)p.n_bodies * sizeof(double));
         return CAROM_OK;
     }
-    gather(w, c->v, w->rows.v);
-    gather(w, v_bar, r->velocity_bar);
+    crm_gather(w, c->v, w->rows.v);
+    crm_gather(w, v_bar, r->velocity_bar);
     const carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
     const carom_status e = carom_contact_adjoint(w->solver, &p, &x, r->velocity_bar, &r->bars);
-    r->stats.factorizations++;
+    r->stats.solves++;
     return e;
 }
 
@@ -117,22 +110,19 @@ static void add_friction(crm_reverse *r, const crm_contact *c, double mu_bar)
     g[c->body_b] += mu_bar * crm_combine_slope(rule, b, a);
 }
 
-/* A closed contact without friction has no tangential row, but a right-sided derivative: friction
- * would oppose its slip, mu_bar = -sign(u_t) l_n J_t W p with p = u_bar.  0 where it does not slip.
- */
+/* mu_bar = d l_t / d mu . J_t W p with p = u_bar. */
 static double first_friction(const crm_reverse *r, const crm_solve *c, int k, const crm_contact *x)
 {
     const crm_rows *rows = &r->world->rows;
-    const double *jt = &rows->jt[6 * k];
-    const double u = crm_row_dot(jt, c->v, x->body_a, x->body_b);
+    const double slope = crm_first_friction(r->world, c, k, x);
     double sum = 0;
-    if (c->mode[k] == CAROM_SEPARATED || u == 0) return 0;
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; slope != 0 && i < 6; i++) {
         const int body = rows->contact_body[2 * k + i / 3];
-        if (body >= 0)
-            sum += jt[i] * rows->inv_mass[3 * body + i % 3] * r->bars.u[3 * body + i % 3];
+        if (body < 0) continue;
+        const int at = 3 * body + i % 3;
+        sum += rows->jt[6 * k + i] * rows->inv_mass[at] * r->bars.u[at];
     }
-    return (u > 0 ? -1 : 1) * c->ln[k] * sum;
+    return slope * sum;
 }
 
 static void friction_vjp(crm_reverse *r, const crm_solve *c, int k, const crm_contact *x)

@@ -87,6 +87,7 @@ static carom_status record_substep(void *user, const crm_substep *s)
     pack(island, s, &b, r);
     r->s.force = t->frames[t->frame].force;
     r->which = (int)(island - t->source->islands.list);
+    r->inner = s != &t->source->sub;
     if (s->n_contacts > t->most_contacts) t->most_contacts = s->n_contacts;
     t->n_records++;
     return CAROM_OK;

@@ -67,10 +67,11 @@ typedef struct carom_gradient {
     double *motor_limit;  /* n_joints */
 } carom_gradient;
 
+/* What a pass over the tape has met and done. */
 typedef struct carom_gradient_stats {
     int degenerate;            /* contacts at kinks, all sub-steps: a one-sided element was taken */
     int first_degenerate_step; /* -1: none */
-    int factorizations;
+    long solves;               /* contact problems differentiated, per direction */
 } carom_gradient_stats;
 
 /* Reverse pass over the whole tape: gradient of  sum_k <q_bar_k, q_k> + <v_bar_k, v_k>.
@@ -79,6 +80,32 @@ typedef struct carom_gradient_stats {
 CAROM_API carom_status carom_tape_gradient(carom_tape *tape, int n_bars,
                                            const carom_state_bar *bars,
                                            const carom_gradient *gradient,
+                                           carom_gradient_stats *stats);
+
+/* Change of the state after `step` steps: 3 n_bodies each, overwritten; NULL: not wanted. */
+typedef struct carom_state_dot {
+    int step;
+    double *q;
+    double *v;
+} carom_state_dot;
+
+/* Forward pass over the whole tape: derivatives of states along directions, the transpose of
+ * carom_tape_gradient.  directions: n_directions of them, arrays as in a gradient, read only; NULL:
+ * that does not move.  All share the factors of every contact problem.  dots: n_dots states of
+ * direction 0, then n_dots of direction 1, ...; any order. */
+CAROM_API carom_status carom_tape_tangent(carom_tape *tape, int n_directions,
+                                          const carom_gradient *directions, int n_dots,
+                                          const carom_state_dot *dots, carom_gradient_stats *stats);
+
+/* Dense derivative of one recorded step, `step` steps after the start, 0 <= step <
+ * carom_tape_steps.  Every array of `rows` holds, for each of the 6 n_bodies components of the
+ * state (q, then v) after the step, one after the other, what it holds in a gradient of that
+ * component by the state before the step and the parameters: rows->q0 and rows->v0 are 6n x 3n,
+ * rows->force 6n x 3n, rows->mass 6n x n, row by row, with n = n_bodies; force_steps is that of the
+ * one step, as force is.  By columns (carom_tape_tangent) or by rows (carom_tape_gradient),
+ * whichever is less work; the two agree to rounding.  Time that the step before owes counts as
+ * spent. */
+CAROM_API carom_status carom_tape_jacobian(carom_tape *tape, int step, const carom_gradient *rows,
                                            carom_gradient_stats *stats);
 
 #ifdef __cplusplus
