@@ -11,15 +11,29 @@ static void must(const carom_world *w, carom_status e)
     exit(1);
 }
 
-static void add_body(carom_world *w, const scene_body *b)
+static carom_body_type type_of(const scene_body *b)
 {
+    if (b->moves == SCENE_KINEMATIC) return CAROM_KINEMATIC;
+    return b->moves ? CAROM_DYNAMIC : CAROM_STATIC;
+}
+
+static void add_body(carom_world *w, const scene *s, int k)
+{
+    const scene_body *b = &s->bodies[k];
     const carom_vec2 corners[4] = {
         {-b->hx, -b->hy}, {b->hx, -b->hy}, {b->hx, b->hy}, {-b->hx, b->hy}};
     const carom_vec2 center = {0, 0};
-    const carom_shape shapes[3] = {{0, 0, NULL}, {b->hx, 1, &center}, {0, 4, corners}};
-    carom_body_def d = carom_body_at(b->moves ? CAROM_DYNAMIC : CAROM_STATIC, b->q[1], b->q[2]);
+    carom_vec2 polygon[MAX_CORNERS];
+    const int n = b->shape == SHAPE_POLYGON ? s->polygons[k].n : 0;
+    for (int i = 0; i < n; i++) {
+        polygon[i].x = s->polygons[k].corners[i][0];
+        polygon[i].y = s->polygons[k].corners[i][1];
+    }
+    const carom_shape shapes[4] = {
+        {0, 0, NULL}, {b->hx, 1, &center}, {0, 4, corners}, {0, n, polygon}};
+    carom_body_def d = carom_body_at(type_of(b), b->q[1], b->q[2]);
     d.pose.angle = b->q[0];
-    for (int k = 0; k < 3; k++) d.velocity[k] = b->v[k];
+    for (int i = 0; i < 3; i++) d.velocity[i] = b->v[i];
     d.n_shapes = b->shape != SHAPE_NONE;
     d.shapes = &shapes[b->shape];
     d.mass = b->mass;
@@ -29,7 +43,7 @@ static void add_body(carom_world *w, const scene_body *b)
     must(w, carom_world_add_body(w, &d, NULL));
 }
 
-void *own_create(const scene *s, carom_integrator integrator, int order)
+carom_world *own_build(const scene *s, carom_integrator integrator, int order)
 {
     carom_world_settings set = carom_world_defaults();
     carom_world *w = NULL;
@@ -38,12 +52,18 @@ void *own_create(const scene *s, carom_integrator integrator, int order)
     set.integrator = (int)integrator;
     set.order = order;
     must(NULL, carom_world_create(&set, NULL, &w));
-    for (int k = 0; k < s->n_bodies; k++) add_body(w, &s->bodies[k]);
+    for (int k = 0; k < s->n_bodies; k++) add_body(w, s, k);
     for (int k = 0; k < s->n_pins; k++) {
         const scene_pin *p = &s->pins[k];
         const carom_vec2 at = {p->x, p->y};
         must(w, carom_world_add_revolute(w, p->a, p->b, at, NULL));
     }
+    return w;
+}
+
+void *own_create(const scene *s, carom_integrator integrator, int order)
+{
+    carom_world *w = own_build(s, integrator, order);
     must(w, carom_world_seal(w));
     return w;
 }
@@ -80,13 +100,19 @@ static void place(void *self, int body, double q[3])
     for (int k = 0; k < 3; k++) q[k] = all[3 * body + k];
 }
 
+static void speed(void *self, int body, double v[3])
+{
+    const double *all = carom_world_v(self);
+    for (int k = 0; k < 3; k++) v[k] = all[3 * body + k];
+}
+
 static void destroy(void *self)
 {
     carom_world_destroy(self);
 }
 
 const contender CAROM_CONTENDERS[3] = {
-    {"carom euler", create_euler, step, place, destroy},
-    {"carom located", create_located, step, place, destroy},
-    {"carom fixed", create_fixed, step, place, destroy},
+    {"carom euler", create_euler, step, place, destroy, speed},
+    {"carom located", create_located, step, place, destroy, speed},
+    {"carom fixed", create_fixed, step, place, destroy, speed},
 };

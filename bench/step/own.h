@@ -6,6 +6,8 @@
 
 #include "carom/world.h"
 
+/* A world of the scene that is not sealed yet; a failure ends the program. */
+carom_world *own_build(const scene *s, carom_integrator integrator, int order);
 /* A sealed world of the scene; a failure ends the program. */
 void *own_create(const scene *s, carom_integrator integrator, int order);
 

@@ -16,37 +16,60 @@ struct world {
     }
 };
 
-void add_shape(b2Body *body, const scene_body &b)
+void set_corners(b2PolygonShape *shape, const scene_polygon &p)
 {
+    b2Vec2 corners[b2_maxPolygonVertices];
+    const int n = p.n < b2_maxPolygonVertices ? p.n : b2_maxPolygonVertices;
+    for (int i = 0; i < n; i++) corners[i].Set(float(p.corners[i][0]), float(p.corners[i][1]));
+    shape->Set(corners, n);
+}
+
+void add_shape(b2Body *body, const scene *s, int k)
+{
+    const scene_body &b = s->bodies[k];
     b2CircleShape circle;
     b2PolygonShape box;
     circle.m_radius = float(b.hx);
-    box.SetAsBox(float(b.hx), float(b.hy));
+    if (b.shape == SHAPE_BOX) box.SetAsBox(float(b.hx), float(b.hy));
+    if (b.shape == SHAPE_POLYGON) set_corners(&box, s->polygons[k]);
     b2FixtureDef f;
     f.shape = b.shape == SHAPE_DISC ? static_cast<b2Shape *>(&circle) : &box;
     f.density = 1.0f;
     f.friction = float(b.friction);
     f.restitution = float(b.restitution);
     body->CreateFixture(&f);
+    // Of the scene, not of a density: about the position.
+    b2MassData m;
+    m.mass = float(b.mass);
+    m.center.SetZero();
+    m.I = float(b.inertia);
+    if (b.moves == SCENE_DYNAMIC) body->SetMassData(&m);
 }
 
-void add_body(world *self, const scene_body &b)
+b2BodyType type_of(const scene_body &b)
 {
+    if (b.moves == SCENE_KINEMATIC) return b2_kinematicBody;
+    return b.moves ? b2_dynamicBody : b2_staticBody;
+}
+
+void add_body(world *self, const scene *s, int k)
+{
+    const scene_body &b = s->bodies[k];
     b2BodyDef d;
-    d.type = b.moves ? b2_dynamicBody : b2_staticBody;
+    d.type = type_of(b);
     d.angle = float(b.q[0]);
     d.position.Set(float(b.q[1]), float(b.q[2]));
     d.angularVelocity = float(b.v[0]);
     d.linearVelocity.Set(float(b.v[1]), float(b.v[2]));
     b2Body *body = self->w.CreateBody(&d);
-    if (b.shape != SHAPE_NONE) add_shape(body, b);
+    if (b.shape != SHAPE_NONE) add_shape(body, s, k);
     self->bodies.push_back(body);
 }
 
 void *create(const scene *s)
 {
     world *self = new world(s);
-    for (int k = 0; k < s->n_bodies; k++) add_body(self, s->bodies[k]);
+    for (int k = 0; k < s->n_bodies; k++) add_body(self, s, k);
     for (int k = 0; k < s->n_pins; k++) {
         const scene_pin &p = s->pins[k];
         b2RevoluteJointDef j;
@@ -72,6 +95,14 @@ void place(void *self, int body, double q[3])
     q[2] = double(b->GetPosition().y);
 }
 
+void speed(void *self, int body, double v[3])
+{
+    const b2Body *b = static_cast<world *>(self)->bodies[size_t(body)];
+    v[0] = double(b->GetAngularVelocity());
+    v[1] = double(b->GetLinearVelocity().x);
+    v[2] = double(b->GetLinearVelocity().y);
+}
+
 void destroy(void *self)
 {
     delete static_cast<world *>(self);
@@ -79,4 +110,4 @@ void destroy(void *self)
 
 } // namespace
 
-const contender BOX2D = {"Box2D 2.4", create, step, place, destroy};
+const contender BOX2D = {"Box2D 2.4", create, step, place, destroy, speed};

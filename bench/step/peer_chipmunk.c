@@ -11,12 +11,30 @@ typedef struct world {
     int n_bodies, n_shapes, n_joints;
     cpBody **bodies;
     cpShape **shapes;
-    cpConstraint *joints[16];
+    cpConstraint *joints[MAX_PINS];
 } world;
 
-static void add_body(world *s, const scene_body *b)
+static cpBody *new_body(const scene_body *b)
 {
-    cpBody *body = b->moves ? cpBodyNew(b->mass, b->inertia) : cpBodyNewStatic();
+    if (b->moves == SCENE_KINEMATIC) return cpBodyNewKinematic();
+    return b->moves ? cpBodyNew(b->mass, b->inertia) : cpBodyNewStatic();
+}
+
+static cpShape *new_shape(const scene *t, int k, cpBody *body)
+{
+    const scene_body *b = &t->bodies[k];
+    cpVect corners[MAX_CORNERS];
+    if (b->shape == SHAPE_DISC) return cpCircleShapeNew(body, b->hx, cpvzero);
+    if (b->shape == SHAPE_BOX) return cpBoxShapeNew(body, 2 * b->hx, 2 * b->hy, 0);
+    const scene_polygon *p = &t->polygons[k];
+    for (int i = 0; i < p->n; i++) corners[i] = cpv(p->corners[i][0], p->corners[i][1]);
+    return cpPolyShapeNewRaw(body, p->n, corners, 0);
+}
+
+static void add_body(world *s, const scene *t, int k)
+{
+    const scene_body *b = &t->bodies[k];
+    cpBody *body = new_body(b);
     cpBodySetAngle(body, b->q[0]);
     cpBodySetPosition(body, cpv(b->q[1], b->q[2]));
     if (b->moves) {
@@ -25,8 +43,7 @@ static void add_body(world *s, const scene_body *b)
     }
     s->bodies[s->n_bodies++] = cpSpaceAddBody(s->space, body);
     if (b->shape == SHAPE_NONE) return;
-    cpShape *shape = b->shape == SHAPE_DISC ? cpCircleShapeNew(body, b->hx, cpvzero)
-                                            : cpBoxShapeNew(body, 2 * b->hx, 2 * b->hy, 0);
+    cpShape *shape = new_shape(t, k, body);
     /* It multiplies those of a pair. */
     cpShapeSetFriction(shape, sqrt(b->friction));
     cpShapeSetElasticity(shape, sqrt(b->restitution));
@@ -43,7 +60,7 @@ static void *create(const scene *s)
     self->shapes = calloc((size_t)s->n_bodies, sizeof *self->shapes);
     if (!self->bodies || !self->shapes) abort();
     cpSpaceSetGravity(self->space, cpv(0, -s->gravity));
-    for (int k = 0; k < s->n_bodies; k++) add_body(self, &s->bodies[k]);
+    for (int k = 0; k < s->n_bodies; k++) add_body(self, s, k);
     for (int k = 0; k < s->n_pins; k++) {
         const scene_pin *p = &s->pins[k];
         cpConstraint *j = cpPivotJointNew(self->bodies[p->a], self->bodies[p->b], cpv(p->x, p->y));
@@ -69,6 +86,15 @@ static void place(void *self, int body, double q[3])
     q[2] = p.y;
 }
 
+static void speed(void *self, int body, double v[3])
+{
+    const world *s = self;
+    const cpVect u = cpBodyGetVelocity(s->bodies[body]);
+    v[0] = cpBodyGetAngularVelocity(s->bodies[body]);
+    v[1] = u.x;
+    v[2] = u.y;
+}
+
 static void destroy(void *self)
 {
     world *s = self;
@@ -90,4 +116,4 @@ static void destroy(void *self)
     free(s);
 }
 
-const contender CHIPMUNK = {"Chipmunk 7", create, step, place, destroy};
+const contender CHIPMUNK = {"Chipmunk 7", create, step, place, destroy, speed};

@@ -6,10 +6,12 @@
 extern "C" {
 #endif
 
-typedef enum body_shape { SHAPE_NONE, SHAPE_DISC, SHAPE_BOX } body_shape;
+typedef enum body_shape { SHAPE_NONE, SHAPE_DISC, SHAPE_BOX, SHAPE_POLYGON } body_shape;
+
+enum { SCENE_STATIC, SCENE_DYNAMIC, SCENE_KINEMATIC };
 
 typedef struct scene_body {
-    int moves;
+    int moves; /* one of the three */
     body_shape shape;
     double hx, hy; /* half sides; radius = hx [m] */
     double q[3];   /* (angle, x, y) */
@@ -23,12 +25,21 @@ typedef struct scene_pin {
     double x, y;
 } scene_pin;
 
+/* Counterclockwise, in the body's frame. */
+typedef struct scene_polygon {
+    int n;
+    double (*corners)[2];
+} scene_polygon;
+
+enum { MAX_PINS = 256, MAX_CORNERS = 64 };
+
 typedef struct scene {
     const char *name;
     int n_bodies, max_bodies;
     scene_body *bodies;
+    scene_polygon *polygons; /* one per body, read of SHAPE_POLYGON; NULL: there is none */
     int n_pins;
-    scene_pin pins[16];
+    scene_pin pins[MAX_PINS];
     double gravity, dt;
     int rests;   /* 1: nothing should move */
     int warm_up; /* steps before the clock runs */
@@ -53,6 +64,7 @@ typedef struct contender {
     void (*step)(void *self, counters *c);
     void (*place)(void *self, int body, double q[3]);
     void (*destroy)(void *self);
+    void (*speed)(void *self, int body, double v[3]); /* (omega, vx, vy) */
 } contender;
 
 extern const contender CAROM_CONTENDERS[3];

@@ -323,6 +323,15 @@ static int gains_energy(const carom_world *w, const crm_substep *s, const double
     return mass_speed(w, v) > GAIN * most;
 }
 
+/* 1: contacts are made to slip on, perhaps far beyond their stop, which friction drives there. */
+static int forced(const crm_substep *s)
+{
+    for (int k = 0; k < s->n_contacts; k++) {
+        if (s->slips[k]) return 1;
+    }
+    return 0;
+}
+
 /* Impacts within a sub-step that located none: it has moved as if plastic; its velocities are those
  * of one impact at its end, v1 = v0 + h (W f + g) + W J1' l.  *done = 0: nothing bounces. */
 static carom_status bounce(carom_world *w, crm_substep *s, int *done)
@@ -368,7 +377,7 @@ carom_status crm_smooth(carom_world *w, double h)
     carom_status e = CAROM_OK;
     if (s->ahead) e = bounce(w, s, &done);
     if (e >= 0 && !done) e = stage_2(w, s);
-    if (e >= 0 && !done && gains_energy(w, s, s->v1)) return CAROM_E_NO_SOLUTION;
+    if (e >= 0 && !done && !forced(s) && gains_energy(w, s, s->v1)) return CAROM_E_NO_SOLUTION;
     return e < 0 ? e : worse(e, worse(met, cleared));
 }
 
