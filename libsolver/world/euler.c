@@ -175,7 +175,7 @@ carom_status crm_euler(carom_world *w, double h)
     crm_copy(w, c->q, s->q0);
     crm_rows_at(w, s, s->q0);
     crm_solve_start(w, s, c);
-    const carom_status e = crm_solve_bounce(w, s, c, s->v0, 0);
+    const carom_status e = crm_solve_bounce(w, s, c, 0);
     if (e < 0) return e;
     crm_copy(w, s->v1, c->v);
     crm_copy(w, s->q1, s->q0);

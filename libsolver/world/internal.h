@@ -112,9 +112,9 @@ void crm_solve_velocity(carom_world *w, const crm_substep *s, const crm_solve *c
 void crm_solve_start(carom_world *w, const crm_substep *s, crm_solve *c);
 /* The problem of the rows in place with the right-hand sides of one solve. */
 carom_contact_problem crm_problem(carom_world *w, const crm_substep *s, const crm_solve *c);
-/* c->cn: restitution e u_n of an approach of v faster than v_rest, equations.md (3); gap / h for
- * speculative contacts. */
-void crm_velocity_targets(carom_world *w, const crm_substep *s, const double *v, crm_solve *c);
+/* c->cn: restitution e u_n of an approach of v0 faster than v_rest, equations.md (3); gap / h for
+ * speculative contacts.  1 when a contact bounces. */
+int crm_velocity_targets(carom_world *w, crm_substep *s, crm_solve *c);
 /* w->rows and rows.u of a solve of this sub-step, from recorded states alone. */
 carom_contact_problem crm_solve_problem(carom_world *w, crm_substep *s, const crm_solve *c);
 
@@ -213,8 +213,19 @@ void crm_rows_free(carom_world *w);
 carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use_guess);
 /* The same for a problem with restitution, unless plastic; where that leaves no solution, without,
  * then without friction, then with as much approach as must be. */
-carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, const double *v,
-                              int plastic);
+carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, int plastic);
+
+/* energy.c */
+/* Speed of the island in the mass metric: sqrt(v' M v). */
+double crm_mass_speed(const carom_world *w, const double *v);
+/* Right-hand sides of a solve for the present s->restitution; 1 when a contact bounces. */
+typedef int crm_sides(carom_world *w, crm_substep *s, crm_solve *c);
+/* A solve with restitution that met status e: where it has given the island energy it is solved
+ * again with less (CAROM_RELAXED). */
+carom_status crm_bound_bounce(carom_world *w, crm_substep *s, crm_solve *c, crm_sides *set,
+                              carom_status e);
+
+/* solve.c */
 /* q += scale v for moving bodies. */
 void crm_move(const carom_world *w, double *q, const double *v, double scale);
 /* Rounding error of a position difference, from the farthest body [m]. */

@@ -154,11 +154,12 @@ carom_contact_problem crm_problem(carom_world *w, const crm_substep *s, const cr
     return p;
 }
 
-void crm_velocity_targets(carom_world *w, const crm_substep *s, const double *v, crm_solve *c)
+int crm_velocity_targets(carom_world *w, crm_substep *s, crm_solve *c)
 {
+    int any = 0;
     for (int k = 0; k < s->n_contacts; k++) {
         const crm_contact *x = &s->contacts[k];
-        const double un = crm_row_dot(&w->rows.jn[6 * k], v, x->body_a, x->body_b);
+        const double un = crm_row_dot(&w->rows.jn[6 * k], s->v0, x->body_a, x->body_b);
         const double e = crm_restitution(w, x);
         c->cn[k] = 0;
         c->ct[k] = 0;
@@ -167,9 +168,11 @@ void crm_velocity_targets(carom_world *w, const crm_substep *s, const double *v,
         } else if (un < -w->rest_speed) {
             c->cn[k] = s->restitution * e * un;
         }
+        any |= c->cn[k] < 0;
     }
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
     crm_motor_sides(w, c);
+    return any;
 }
 
 void crm_solve_velocity(carom_world *w, const crm_substep *s, const crm_solve *c)

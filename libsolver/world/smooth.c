@@ -276,7 +276,7 @@ static double bounce_side(const carom_world *w, const crm_substep *s, int k, dou
 }
 
 /* Right-hand sides of a bounce, rows at q1 in place; 1 when a contact bounces. */
-static int bounce_sides(const carom_world *w, const crm_substep *s, crm_solve *c)
+static int bounce_sides(carom_world *w, crm_substep *s, crm_solve *c)
 {
     const double apart = 4 * crm_top_speed(w, s->v0);
     int any = 0;
@@ -289,18 +289,6 @@ static int bounce_sides(const carom_world *w, const crm_substep *s, crm_solve *c
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
     crm_motor_sides(w, c);
     return any;
-}
-
-/* Speed in the mass metric: sqrt(v' M v). */
-static double mass_speed(const carom_world *w, const double *v)
-{
-    double sum = 0;
-    for (int k = 0; k < w->island->n_bodies; k++) {
-        const int b = w->island->bodies[k];
-        const double *x = v + 3 * b;
-        sum += w->inertia[b] * x[0] * x[0] + w->mass[b] * (x[1] * x[1] + x[2] * x[2]);
-    }
-    return sqrt(sum);
 }
 
 /* What holds at rest does no work: |v| <= |v0| + h |W f + g| in the mass metric,
@@ -318,9 +306,9 @@ static int gains_energy(const carom_world *w, const crm_substep *s, const double
         push += w->inertia[b] * a[0] * a[0] + w->mass[b] * (a[1] * a[1] + a[2] * a[2]);
         mass += w->mass[b];
     }
-    const double most =
-        mass_speed(w, s->v0) + s->h * sqrt(push) + w->recovery * sqrt(mass) + crm_drive_gain(w, s);
-    return mass_speed(w, v) > GAIN * most;
+    const double most = crm_mass_speed(w, s->v0) + s->h * sqrt(push) + w->recovery * sqrt(mass) +
+                        crm_drive_gain(w, s);
+    return crm_mass_speed(w, v) > GAIN * most;
 }
 
 /* 1: contacts are made to slip on, perhaps far beyond their stop, which friction drives there. */
@@ -344,12 +332,13 @@ static carom_status bounce(carom_world *w, crm_substep *s, int *done)
     crm_solve_start(w, s, c);
     if (!bounce_sides(w, s, c)) return CAROM_OK;
     carom_status e = crm_solve_run(w, s, c, 1);
-    const int unsolved = e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION;
-    if (unsolved || (e >= 0 && gains_energy(w, s, c->v))) {
+    if (e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION) {
         s->restitution = 0;
         bounce_sides(w, s, c);
         e = crm_solve_run(w, s, c, 0);
         if (e >= 0) e = CAROM_RELAXED;
+    } else if (e >= 0) {
+        e = crm_bound_bounce(w, s, c, bounce_sides, e);
     }
     if (e < 0) return e;
     crm_copy(w, s->v1, c->v);
@@ -393,12 +382,7 @@ carom_status crm_impact(carom_world *w, int plastic)
     crm_copy(w, c->q, s->q0);
     crm_rows_at(w, s, s->q0);
     crm_solve_start(w, s, c);
-    carom_status e = crm_solve_bounce(w, s, c, s->v0, plastic);
-    /* Newton's law of restitution may give energy where contacts and joints are coupled. */
-    if (e >= 0 && !plastic && gains_energy(w, s, c->v)) {
-        e = crm_solve_bounce(w, s, c, s->v0, 1);
-        if (e >= 0) e = worse(e, CAROM_RELAXED);
-    }
+    const carom_status e = crm_solve_bounce(w, s, c, plastic);
     if (e < 0) return e;
     crm_copy(w, s->v1, c->v);
     crm_copy(w, s->q1, s->q0);

@@ -146,16 +146,16 @@ static int give_way(carom_world *w, const crm_substep *s, crm_solve *c)
     return 1;
 }
 
-carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, const double *v,
-                              int plastic)
+carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, int plastic)
 {
     s->restitution = !plastic;
     s->slick = 0;
-    crm_velocity_targets(w, s, v, c);
+    const int bounces = crm_velocity_targets(w, s, c);
     carom_status e = crm_solve_run(w, s, c, 1);
+    if (e >= 0 && bounces) e = crm_bound_bounce(w, s, c, crm_velocity_targets, e);
     if (!unsolved(e)) return e;
     s->restitution = 0;
-    crm_velocity_targets(w, s, v, c);
+    crm_velocity_targets(w, s, c);
     e = crm_solve_run(w, s, c, 0);
     if (unsolved(e)) {
         s->slick = 1;
