@@ -136,29 +136,7 @@ static void swing(int kind, int order, int n, double *q)
     scene_order = order;
     carom_world *w = scene_world(9.81, (kind ? 0.3 : 0.8) / n);
     scene_order = 2;
-    int last = scene_anchor(w);
-    if (kind == 0) {
-        carom_vec2 pin = {0, 0};
-        for (int k = 0; k < 3; k++) {
-            const double a = 1 + 0.2 * k;
-            const carom_pose pose = {a, pin.x + 0.5 * sin(a), pin.y - 0.5 * cos(a)};
-            const int b = scene_box(w, 1, 0.05, 0.5, pose, 0, 0);
-            assert_int_equal(carom_world_add_revolute(w, last, b, pin, NULL), CAROM_OK);
-            pin.x += sin(a);
-            pin.y -= cos(a);
-            last = b;
-        }
-    } else {
-        const carom_vec2 center = {0, 0};
-        const carom_shape round = {1, 1, &center};
-        carom_body_def d = carom_body_defaults();
-        d.type = CAROM_STATIC;
-        d.shapes = &round;
-        d.n_shapes = 1;
-        d.friction = 0.9;
-        assert_int_equal(carom_world_add_body(w, &d, NULL), CAROM_OK);
-        last = scene_disc(w, 1, 0.3, 1.3 * sin(0.3), 1.3 * cos(0.3), 0.9, 0);
-    }
+    const int last = kind ? scene_roll_off(w) : scene_links(w, 3);
     scene_run(w, n, NULL);
     for (int k = 0; k < 3; k++) q[k] = q_of(w, last)[k];
     carom_world_destroy(w);
@@ -196,39 +174,6 @@ static void orders_are_what_they_say(void **state)
     }
 }
 
-/* A thin ladder slides down a smooth wall and leaves it. */
-static int ladder(carom_world *w)
-{
-    const carom_vec2 wall[4] = {{-1, -5}, {0, -5}, {0, 5}, {-1, 5}};
-    const carom_shape shape = {0, 4, wall};
-    const double a = 0.5;
-    const double c = 1e-3;
-    carom_body_def d = carom_body_defaults();
-    d.type = CAROM_STATIC;
-    d.shapes = &shape;
-    d.n_shapes = 1;
-    d.friction = 0;
-    assert_int_equal(carom_world_add_body(w, &d, NULL), CAROM_OK);
-    scene_floor(w, 0, 0);
-    /* its lowest corner on the floor, its leftmost on the wall */
-    const carom_pose pose = {a, c * cos(a) + sin(a), c * sin(a) + cos(a)};
-    return scene_box(w, 1, c, 1, pose, 0, 0);
-}
-
-/* A disc rolls off a disc: it sticks, begins to slip, and leaves. */
-static int roll_off(carom_world *w)
-{
-    const carom_vec2 center = {0, 0};
-    const carom_shape round = {1, 1, &center};
-    carom_body_def d = carom_body_defaults();
-    d.type = CAROM_STATIC;
-    d.shapes = &round;
-    d.n_shapes = 1;
-    d.friction = 0.9;
-    assert_int_equal(carom_world_add_body(w, &d, NULL), CAROM_OK);
-    return scene_disc(w, 1, 0.3, 1.3 * sin(0.3), 1.3 * cos(0.3), 0.9, 0);
-}
-
 static void after_one_second(int (*build)(carom_world *), int order, int n, double *q)
 {
     scene_order = order;
@@ -245,7 +190,7 @@ static void after_one_second(int (*build)(carom_world *), int order, int n, doub
 static void orders_hold_through_changes(void **state)
 {
     (void)state;
-    int (*const builds[2])(carom_world *) = {ladder, roll_off};
+    int (*const builds[2])(carom_world *) = {scene_ladder, scene_roll_off};
     static const int coarse[2][2] = {{30, 15}, {60, 60}};
     for (int scene = 0; scene < 2; scene++) {
         double exact[3];

@@ -7,13 +7,13 @@
 /* Position errors below this are left alone [L], and holds of a position that are tried. */
 static const double HOLD_TOL = 1e-14;
 
-/* Columns of the table: n = 1 .. k sub-steps of h / n.  The error of S expands in h^2, so the
- * values T_n combine as polynomials in (h / n)^2 at 0 (Gragg, Bulirsch and Stoer; Aitken and
+/* Columns of the table: n = first .. last sub-steps of h / n.  The error of S expands in h^2, so
+ * the values T_n combine as polynomials in (h / n)^2 at 0 (Gragg, Bulirsch and Stoer; Aitken and
  * Neville): c_n = prod over j != n of n^2 / (n^2 - j^2). */
-static double weight(int n, int columns)
+static double weight(int n, int first, int last)
 {
     double c = 1;
-    for (int j = 1; j <= columns; j++) {
+    for (int j = first; j <= last; j++) {
         if (j != n) c *= (double)(n * n) / (n * n - j * j);
     }
     return c;
@@ -110,8 +110,9 @@ static void combine(carom_world *w, int columns)
     }
 }
 
-/* Largest difference to the map of the next lower order, as a way of a point of a body [m]. */
-static double estimate(const carom_world *w, int columns)
+/* Largest way of a point of a body that the value of `columns` columns is apart from that without
+ * the first one, which is the map of the next lower order [m]. */
+static double apart(const carom_world *w, int columns)
 {
     double largest = 0;
     for (int i = 0; i < w->island->n_bodies; i++) {
@@ -119,13 +120,24 @@ static double estimate(const carom_world *w, int columns)
         double d[3] = {0, 0, 0};
         for (int n = 1; n <= columns; n++) {
             const double *q = &w->inner[n * (n + 1) / 2 - 1].q1[3 * b];
-            const double c = w->sub.weight[n - 1] - (n < columns ? weight(n, columns - 1) : 0);
+            const double c = weight(n, 1, columns) - (n > 1 ? weight(n, 2, columns) : 0);
             for (int k = 0; k < 3; k++) d[k] += c * q[k];
         }
         const double reach = w->bodies[b].reach;
         largest = fmax(largest, hypot(d[1], d[2]) + reach * fabs(d[0]));
     }
     return largest;
+}
+
+/* Of the value of k columns.  With the error E_m h^2m / prod n^2 of a value that m columns n give,
+ * the difference e_k to that of columns 2 .. k is E_(k-1) h^(2k-2) / k!^2; as E_m go on as they
+ * did, E_k = E_(k-1)^2 / E_(k-2), the error is k^2 e_k^2 / e_(k-1).  Of two columns e_2 is known
+ * alone, which is above it. */
+static double estimate(const carom_world *w, int k)
+{
+    const double e = apart(w, k);
+    const double before = k > 2 ? apart(w, k - 1) : 0;
+    return before > 0 ? fmin(e, k * k * e * (e / before)) : e;
 }
 
 /* The outer solves 0 and 1 show the modes and impulses of the finest column, for those who look. */
@@ -247,23 +259,48 @@ static void take_finest(carom_world *w, int columns)
     combine(w, columns);
 }
 
-carom_status crm_extrapolate(carom_world *w, double h)
+/* Columns first .. last; the worst status. */
+static carom_status run_columns(carom_world *w, int first, int last, double h)
 {
-    crm_substep *s = &w->sub;
-    const int columns = w->settings.order / 2;
-    const int n_inner = columns * (columns + 1) / 2;
     carom_status worst = CAROM_OK;
-    s->h = h;
-    for (int n = 1; n <= columns; n++) {
+    for (int n = first; n <= last; n++) {
         const carom_status e = run_column(w, n, n * (n - 1) / 2, h);
         if (e < 0) return e;
         if (e > worst) worst = e;
-        s->weight[n - 1] = weight(n, columns);
     }
+    return worst;
+}
+
+/* As many columns as are given, or as the tolerance asks for; their number goes to *columns. */
+static carom_status run_table(carom_world *w, double h, int *columns)
+{
+    const int most = w->settings.order / 2;
+    const double allowed = w->settings.tolerance * h / w->settings.dt;
+    const int given = w->settings.tolerance > 0 ? w->sub.columns : most;
+    *columns = given > 0 ? given : 2;
+    carom_status worst = run_columns(w, 1, *columns, h);
+    while (worst >= 0 && given == 0 && *columns < most) {
+        if (one_mode(w, *columns * (*columns + 1) / 2) && estimate(w, *columns) <= allowed) break;
+        const carom_status e = run_columns(w, *columns + 1, *columns + 1, h);
+        if (e < 0 || e > worst) worst = e;
+        ++*columns;
+    }
+    return worst;
+}
+
+carom_status crm_extrapolate(carom_world *w, double h)
+{
+    crm_substep *s = &w->sub;
+    int columns;
+    s->h = h;
+    const carom_status worst = run_table(w, h, &columns);
+    if (worst < 0) return worst;
+    for (int n = 1; n <= columns; n++) s->weight[n - 1] = weight(n, 1, columns);
     s->map = CRM_MAP_EXTRAPOLATED;
-    s->n_inner = n_inner;
+    s->columns = columns;
+    s->n_inner = columns * (columns + 1) / 2;
     show(w, columns);
-    s->finest = !one_mode(w, n_inner);
+    s->finest = !one_mode(w, s->n_inner);
     if (s->finest) {
         take_finest(w, columns);
         return worst;

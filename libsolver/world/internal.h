@@ -312,6 +312,9 @@ carom_status crm_stop_passing(carom_world *w, double left);
 /* Runs S on (0, left]; when a contact outside sub.contacts closes on the way, ends at the
  * first such event; when more than `allowed` do, *busy = 1 and nothing counts. */
 carom_status crm_locate(carom_world *w, double left, int allowed, int *busy);
+/* Whether the estimate of sub is above the tolerance; *h is then how long it may be: the error of k
+ * columns grows with h^(2k + 1). */
+int crm_is_too_long(const carom_world *w, double *h);
 
 /* events.c */
 void crm_events_free(carom_world *w);

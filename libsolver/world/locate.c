@@ -10,6 +10,10 @@ static const double ROOT_TOL = 1e-13;
 static const double DEEP = 0.1;
 /* Illinois steps for one root, rounds over several roots, halvings of a failed sub-step. */
 enum { MAX_ROOT_STEPS = 60, MAX_ROUNDS = 20, MAX_HALVINGS = 4, MAX_SAMPLES = 64 };
+/* A sub-step that is too long for the tolerance is tried at this share of what would do, so often.
+ */
+static const double SAFE = 0.8;
+enum { MAX_SHRINKS = 12 };
 
 /* A gap that was positive at q0 and is watched: of a whole pair (its signed distance), or of one
  * feature of a pair that touches elsewhere. */
@@ -409,6 +413,7 @@ static carom_status rescue(carom_world *w, double h, double left, carom_status f
 carom_status crm_run_through(carom_world *w, double left)
 {
     w->sub.end = CRM_END_FRAME;
+    w->sub.columns = 0;
     w->sub.map = w->smooth && w->effort < CRM_WORN ? CRM_MAP_SMOOTH : CRM_MAP_EULER;
     carom_status e = crm_map_run(w, left);
     if (unsolved(e)) e = halve(w, left, left, e);
@@ -460,7 +465,7 @@ static carom_status stopped(carom_world *w, double left, carom_status e)
     return s < 0 || s > e ? s : e;
 }
 
-carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
+static carom_status locate(carom_world *w, double left, int allowed, int *busy)
 {
     crm_substep *s = &w->sub;
     carom_status e = crm_run_through(w, left);
@@ -486,6 +491,36 @@ carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
         }
         if (!unsolved(e)) return e;
         e = rescue(w, h, left, e);
+    }
+    return e;
+}
+
+int crm_is_too_long(const carom_world *w, double *h)
+{
+    const crm_substep *s = &w->sub;
+    const double allowed = w->settings.tolerance * s->h / w->settings.dt;
+    if (!(w->settings.tolerance > 0)) return 0;
+    if (s->map != CRM_MAP_EXTRAPOLATED || s->finest || s->estimate <= allowed) return 0;
+    const double shrink = SAFE * pow(allowed / s->estimate, 1.0 / (2 * s->columns));
+    *h = s->h * fmax(shrink, 0.1);
+    return 1;
+}
+
+/* The end of a sub-step that was given less than the time left. */
+static void end_within(crm_substep *s, double left)
+{
+    if (s->end == CRM_END_FRAME || s->end == CRM_END_FRACTION) end_at_fraction(s, left);
+}
+
+carom_status crm_locate(carom_world *w, double left, int allowed, int *busy)
+{
+    carom_status e = locate(w, left, allowed, busy);
+    double h = left;
+    for (int k = 0; e >= 0 && !*busy && crm_is_too_long(w, &h); k++) {
+        if (k == MAX_SHRINKS) return e < CAROM_LIMIT ? CAROM_LIMIT : e;
+        crm_guess_load(w, h);
+        e = locate(w, h, allowed, busy);
+        if (e >= 0 && !*busy) end_within(&w->sub, left);
     }
     return e;
 }

@@ -68,6 +68,7 @@ static carom_status commit(carom_world *w)
 static int substeps_allowed(const carom_world *w)
 {
     if (w->settings.integrator == CAROM_FIXED) return 1;
+    if (w->settings.tolerance > 0) return w->settings.max_substeps;
     const int n = w->island->n_bodies > 0 ? BODY_SUBSTEPS / w->island->n_bodies : BODY_SUBSTEPS;
     if (n < 1 || (!w->island->n_pairs && !w->island->n_limited)) return 1;
     return n < w->settings.max_substeps ? n : w->settings.max_substeps;
@@ -108,8 +109,10 @@ static carom_status run_last(carom_world *w, double left)
         const carom_status stopped = crm_stop_passing(w, left);
         if (stopped) e = stopped;
     }
+    double h;
     const int asked = w->settings.integrator != CAROM_FIXED;
-    return e >= 0 && e < CAROM_LIMIT && asked && met_ahead(&w->sub) ? CAROM_LIMIT : e;
+    const int missed = (asked && met_ahead(&w->sub)) || crm_is_too_long(w, &h);
+    return e >= 0 && e < CAROM_LIMIT && missed ? CAROM_LIMIT : e;
 }
 
 /* Up to the next event; *busy: there are more of them than sub-steps allowed. */

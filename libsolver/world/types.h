@@ -177,6 +177,7 @@ typedef struct crm_substep {
     int n_inner;             /* of an extrapolated map: its smooth sub-steps */
     double weight[CRM_MAX_COLUMNS]; /* ... of its columns */
     double estimate;                /* of its error [m] */
+    int columns;                    /* ... in tolerance mode to be used; 0: to be chosen */
     int finest;                     /* 1: modes change within it, the finest column alone counts */
     int n_solves;
     crm_solve solve[CRM_MAX_SOLVES];

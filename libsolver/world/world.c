@@ -22,7 +22,8 @@ static carom_status check_settings(const carom_world_settings *s)
     const int positive = s->dt > 0 && s->margin > 0 && s->penetration > 0 && s->accept > 0 &&
                          s->inexact >= s->accept && s->length >= 0 && s->rest_speed >= 0;
     const int bounded = s->dt < HUGE_VAL && s->margin < 1 && s->penetration < 1 &&
-                        s->length < HUGE_VAL && s->rest_speed < HUGE_VAL;
+                        s->length < HUGE_VAL && s->rest_speed < HUGE_VAL && s->tolerance >= 0 &&
+                        s->tolerance < HUGE_VAL;
     const int order = s->order >= 2 && s->order <= 2 * CRM_MAX_COLUMNS && s->order % 2 == 0;
     const int finite = isfinite(s->gravity[0]) && isfinite(s->gravity[1]);
     const int words = s->integrator >= CAROM_EULER && s->integrator <= CAROM_FIXED &&
@@ -38,8 +39,10 @@ carom_status carom_world_create(const carom_world_settings *settings,
 {
     if (!out) return CAROM_E_ARGUMENT;
     *out = NULL;
-    const carom_world_settings chosen = settings ? *settings : carom_world_defaults();
+    carom_world_settings chosen = settings ? *settings : carom_world_defaults();
     if (check_settings(&chosen)) return CAROM_E_ARGUMENT;
+    if (chosen.tolerance > 0)
+        chosen.order = 2 * CRM_MAX_COLUMNS; /* the highest that it may choose */
     crm_memory memory = crm_memory_from(allocator);
     carom_world *w = crm_new(&memory, 1, sizeof *w);
     if (!w) return CAROM_E_MEMORY;

@@ -7,6 +7,7 @@
 
 carom_integrator scene_integrator = CAROM_EULER;
 int scene_order = 2;
+double scene_tolerance = 0;
 
 static void must(carom_world *w, carom_status e)
 {
@@ -21,6 +22,7 @@ carom_world *scene_world(double g, double dt)
     s.dt = dt;
     s.integrator = (int)scene_integrator;
     s.order = scene_order;
+    s.tolerance = scene_tolerance;
     assert_int_equal(carom_world_create(&s, NULL, &w), CAROM_OK);
     return w;
 }
@@ -97,6 +99,53 @@ void scene_push(carom_world *w, int body, double omega, double vx, double vy)
     v[3 * body + 2] = vy;
     must(w, carom_world_set_state(w, NULL, v));
     free(v);
+}
+
+int scene_ladder(carom_world *w)
+{
+    const carom_vec2 wall[4] = {{-1, -5}, {0, -5}, {0, 5}, {-1, 5}};
+    const carom_shape shape = {0, 4, wall};
+    const double a = 0.5;
+    const double c = 1e-3;
+    carom_body_def d = carom_body_defaults();
+    d.type = CAROM_STATIC;
+    d.shapes = &shape;
+    d.n_shapes = 1;
+    d.friction = 0;
+    assert_int_equal(carom_world_add_body(w, &d, NULL), CAROM_OK);
+    scene_floor(w, 0, 0);
+    /* its lowest corner on the floor, its leftmost on the wall */
+    const carom_pose pose = {a, c * cos(a) + sin(a), c * sin(a) + cos(a)};
+    return scene_box(w, 1, c, 1, pose, 0, 0);
+}
+
+int scene_roll_off(carom_world *w)
+{
+    const carom_vec2 center = {0, 0};
+    const carom_shape round = {1, 1, &center};
+    carom_body_def d = carom_body_defaults();
+    d.type = CAROM_STATIC;
+    d.shapes = &round;
+    d.n_shapes = 1;
+    d.friction = 0.9;
+    assert_int_equal(carom_world_add_body(w, &d, NULL), CAROM_OK);
+    return scene_disc(w, 1, 0.3, 1.3 * sin(0.3), 1.3 * cos(0.3), 0.9, 0);
+}
+
+int scene_links(carom_world *w, int n)
+{
+    carom_vec2 pin = {0, 0};
+    int last = scene_anchor(w);
+    for (int k = 0; k < n; k++) {
+        const double a = 1 + 0.2 * k;
+        const carom_pose pose = {a, pin.x + 0.5 * sin(a), pin.y - 0.5 * cos(a)};
+        const int b = scene_box(w, 1, 0.05, 0.5, pose, 0, 0);
+        assert_int_equal(carom_world_add_revolute(w, last, b, pin, NULL), CAROM_OK);
+        pin.x += sin(a);
+        pin.y -= cos(a);
+        last = b;
+    }
+    return last;
 }
 
 void scene_run(carom_world *w, int n, carom_step_stats *last)

@@ -8,6 +8,8 @@
 extern carom_integrator scene_integrator;
 /* ... and their order; 2 at the start. */
 extern int scene_order;
+/* ... and their tolerance; 0 at the start. */
+extern double scene_tolerance;
 /* Gravity (0, -g), step dt. */
 carom_world *scene_world(double g, double dt);
 /* Static box 40 x 2 whose top is y = 0; index of the body. */
@@ -20,6 +22,12 @@ int scene_disc(carom_world *w, double mass, double radius, double x, double y, d
                double restitution);
 /* Static body without shape at the origin. */
 int scene_anchor(carom_world *w);
+/* n links of 1 kg and 1 m, pinned to the origin and let go from a bent rest; the last. */
+int scene_links(carom_world *w, int n);
+/* A thin ladder, 2 m long, slides down a smooth wall, without friction, and leaves it. */
+int scene_ladder(carom_world *w);
+/* A disc rolls off a disc: it sticks, begins to slip, and leaves. */
+int scene_roll_off(carom_world *w);
 /* Velocity of one body; the rest is kept. */
 void scene_push(carom_world *w, int body, double omega, double vx, double vy);
 /* n steps; every status must be 0 or positive.  *last (may be NULL): statistics of the last. */

@@ -37,6 +37,7 @@ typedef enum carom_combine {
     X(dt, double, 1.0 / 60, "s", "length of a step")                                               \
     X(integrator, int, CAROM_LOCATED, "", "euler, located or fixed")                               \
     X(order, int, 2, "1", "order of located where nothing begins or ends: 2, 4, 6 or 8")           \
+    X(tolerance, double, 0, "m", "of located: error of position allowed in a step; 0: by order")   \
     X(combine_friction, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")                \
     X(combine_restitution, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")             \
     X(length, double, 0, "m", "length scale L; 0: largest diameter of a dynamic body's shape")     \
@@ -183,7 +184,7 @@ typedef struct carom_step_stats {
     double residual;    /* largest of the step's contact problems [1] */
     double penetration; /* largest overlap at the end [m], >= 0 */
     double joint_drift; /* largest position error of a joint at the end [m] */
-    double estimate;    /* of the error of position in this step, order > 2 [m]; else 0 */
+    double estimate;    /* of the error of position in this step, where there is one [m]; else 0 */
     double energy;      /* kinetic + gravitational at the end [J] */
     int n_islands;      /* groups of bodies that advanced alone */
     int n_candidates;   /* pairs that may touch within the step */
