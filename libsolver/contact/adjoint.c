@@ -20,20 +20,18 @@ enum { EXTRA = 2 };
  * C_bar = -q v'.  This is (30) with d_v = W p, d_l = q. */
 typedef struct adjoint {
     double *p;  /* 3 n_bodies */
-    double *f;  /* 3 n_bodies */
-    double *qn; /* n_contacts */
-    double *qt;
-    double *qe; /* n_joint_rows */
+    double *cn; /* n_contacts: -q */
+    double *ct;
+    double *ce; /* n_joint_rows */
 } adjoint;
 
 static adjoint carve(double *scratch, const carom_contact_problem *p)
 {
     adjoint a;
     a.p = scratch;
-    a.f = a.p + 3 * p->n_bodies;
-    a.qn = a.f + 3 * p->n_bodies;
-    a.qt = a.qn + p->n_contacts;
-    a.qe = a.qt + p->n_contacts;
+    a.cn = a.p + 3 * p->n_bodies;
+    a.ct = a.cn + p->n_contacts;
+    a.ce = a.ct + p->n_contacts;
     return a;
 }
 
@@ -67,24 +65,38 @@ static void spread(const crm_island *s, int k, double factor, double qn, double 
     if (sticks(s, k)) crm_add(z, c->t, c->a, c->b, factor * qt);
 }
 
-/* Row defects that are rounding of their own terms become zero: divided by the compliance they
- * would make q noisy where rows depend on each other. */
-static double past_rounding(const double *row, int a, int b, const double *p, double defect)
+/* The row times p, 0 where that is rounding of its terms: divided by the compliance it would make q
+ * noisy where rows depend on each other. */
+static double past_rounding(const double *row, int a, int b, const double *p)
 {
+    double sum = 0;
     double size = 0;
-    for (int i = 0; a >= 0 && i < 3; i++) size += fabs(row[i] * p[3 * a + i]);
-    for (int i = 0; b >= 0 && i < 3; i++) size += fabs(row[3 + i] * p[3 * b + i]);
-    return fabs(defect) <= CRM_ROUNDING * size ? 0 : defect;
+    for (int e = 0; e < 2; e++) {
+        const double *r = row + 3 * e;
+        const double *x = p + 3 * (e ? b : a);
+        if ((e ? b : a) < 0) continue;
+        const double term[3] = {r[0] * x[0], r[1] * x[1], r[2] * x[2]};
+        sum += term[0] + term[1] + term[2];
+        size += fabs(term[0]) + fabs(term[1]) + fabs(term[2]);
+    }
+    return fabs(sum) <= DBL_EPSILON * size ? 0 : sum;
 }
 
+/* B' p of contact k into s->rhs. */
 static void row_defects(crm_island *s, int k)
 {
     const crm_contact *c = &s->contact[k];
-    double *n = &s->rhs.n[k];
-    double *t = &s->rhs.t[k];
-    project(s, k, s->x.z, n, t);
-    *n = past_rounding(c->n, c->a, c->b, s->x.z, *n);
-    *t = past_rounding(c->t, c->a, c->b, s->x.z, *t);
+    s->rhs.n[k] = 0;
+    s->rhs.t[k] = 0;
+    if (s->mode[k] == CAROM_SEPARATED) return;
+    s->rhs.n[k] = past_rounding(c->n, c->a, c->b, s->x.z);
+    if (!(c->mu > 0)) return;
+    const double t = past_rounding(c->t, c->a, c->b, s->x.z);
+    if (sticks(s, k)) {
+        s->rhs.t[k] = t;
+    } else {
+        s->rhs.n[k] += crm_slip_sign(s->mode[k]) * c->mu * t;
+    }
 }
 
 /* What is left of p + C' q = g, B' p = 0 at s->x, into s->rhs; returns its largest entry. */
@@ -115,7 +127,10 @@ static void improve(crm_island *s, double compliance)
 {
     double *z = s->step.z;
     memcpy(z, s->rhs.z, 3 * (size_t)(s->nb + s->ng) * sizeof(double));
-    for (int k = 0; k < s->nc; k++) spread(s, k, -1 / compliance, s->rhs.n[k], s->rhs.t[k], z);
+    for (int k = 0; k < s->nc; k++) {
+        if (s->rhs.n[k] == 0 && s->rhs.t[k] == 0) continue;
+        spread(s, k, -1 / compliance, s->rhs.n[k], s->rhs.t[k], z);
+    }
     crm_island_solve_transposed(s, z);
     for (int k = 0; k < s->nc; k++) {
         double bn;
@@ -127,28 +142,47 @@ static void improve(crm_island *s, double compliance)
     crm_vec_add(s, s->x, 1, s->step);
 }
 
-void crm_island_adjoint(crm_island *s, const double *g, int extra)
+/* s->rhs at s->x = 0. */
+static void first_defect(crm_island *s, const double *g)
+{
+    memcpy(s->rhs.z, g, 3 * (size_t)s->nb * sizeof *g);
+    memset(s->rhs.z + 3 * s->nb, 0, 3 * (size_t)s->ng * sizeof *g);
+    memset(s->rhs.n, 0, (size_t)s->nc * sizeof *g);
+    memset(s->rhs.t, 0, (size_t)s->nc * sizeof *g);
+}
+
+static void factor_active(crm_island *s, double compliance)
+{
+    crm_set_responses(s, compliance);
+    crm_island_factor(s, 1, compliance);
+}
+
+void crm_island_adjoint(crm_island *s, const double *g, double tol, int extra)
 {
     double size = 0;
-    double last = HUGE_VAL;
+    double last = 1;
+    double compliance = CRM_COMPLIANCE;
+    const double enough = fmax(tol, DEFECT_DONE);
+    const int alike = extra == 0;
     for (int i = 0; i < 3 * s->nb; i++) size = fmax(size, fabs(g[i]));
     crm_vec_zero(s, s->x);
     if (!(size > 0)) return;
-    double compliance = CRM_COMPLIANCE;
-    crm_set_responses(s, compliance);
-    crm_island_factor(s, 1, compliance);
-    for (int i = 0; i < CRM_PASSES; i++) {
+    factor_active(s, compliance);
+    first_defect(s, g);
+    improve(s, compliance);
+    for (int i = 1; i < CRM_PASSES; i++) {
         const double e = find_defect(s, g) / size;
-        const int done = e < DEFECT_DONE || (e >= last && e < DEFECT_SMALL);
+        const int done = e < enough || (i > 1 && e >= last && e < DEFECT_SMALL);
         if (done && extra-- == 0) break;
         if (!done && compliance > CRM_COMPLIANCE_TIGHT && i >= CRM_PATIENCE &&
             e > CRM_SLOW * last) {
             compliance = CRM_COMPLIANCE_TIGHT;
-            crm_set_responses(s, compliance);
-            crm_island_factor(s, 1, compliance);
+            factor_active(s, compliance);
         }
-        last = fmin(e, last);
         improve(s, compliance);
+        /* The first pass left so little that one more leaves rounding. */
+        if (alike && e < DEFECT_SMALL) break;
+        last = fmin(e, last);
     }
 }
 
@@ -166,114 +200,145 @@ static int masses_differ(const crm_island *s, const double *root)
     return largest > WIDE * least;
 }
 
-/* Adjoint of one island into the arrays of a. */
-static void solve_island(carom_contact_solver *c, const carom_contact_problem *p,
-                         const unsigned char *mode, const double *v_bar, int island, adjoint *a)
+/* Adjoint of one island, whose values and modes are gathered, into the arrays of a. */
+static void solve_island(carom_contact_solver *c, const double *v_bar, double tol, int island,
+                         adjoint *a)
 {
     const crm_graph *g = &c->graph;
     const crm_system *y = &c->system;
-    crm_system_gather(&c->system, g, p, island);
     crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
-    crm_system_set_modes(g, &s, island, mode);
     double *bar = s.size;
-    const int extra = masses_differ(&s, y->root + 3 * g->node_ptr[island]) ? EXTRA : 0;
     const double *root = y->root + 3 * g->node_ptr[island];
     const int *body_of = g->body_of + g->node_ptr[island];
     for (int i = 0; i < 3 * s.nb; i++) bar[i] = root[i] * v_bar[3 * body_of[i / 3] + i % 3];
-    crm_island_adjoint(&s, bar, extra);
+    crm_island_adjoint(&s, bar, tol, masses_differ(&s, root) ? EXTRA : 0);
     for (int i = 0; i < 3 * s.nb; i++) {
         if (root[i] > 0) a->p[3 * body_of[i / 3] + i % 3] = s.x.z[i] / root[i];
     }
     for (int k = 0; k < s.nc; k++) {
         const int slot = g->contact_ptr[island] + k;
-        a->qn[g->contact_of[slot]] = y->scale_n[slot] * s.x.n[k];
-        a->qt[g->contact_of[slot]] = sticks(&s, k) ? y->scale_t[slot] * s.x.t[k] : 0;
+        a->cn[g->contact_of[slot]] = -y->scale_n[slot] * s.x.n[k];
+        a->ct[g->contact_of[slot]] = sticks(&s, k) ? -y->scale_t[slot] * s.x.t[k] : 0;
     }
     for (int q = 0; q < s.ng; q++) {
         const int slot = g->group_ptr[island] + q;
         for (int i = 0; i < g->group_size[slot]; i++)
-            a->qe[g->group_row[slot] + i] = y->scale_e[3 * slot + i] * s.x.z[3 * (s.nb + q) + i];
+            a->ce[g->group_row[slot] + i] = -y->scale_e[3 * slot + i] * s.x.z[3 * (s.nb + q) + i];
     }
 }
 
-/* f = J' l; and p = g - C' q where W = 0. */
-static void finish(const carom_contact_problem *p, const carom_contact_solution *x, adjoint *a,
-                   double *cq)
+/* p = g - C' q where W = 0. */
+static void prescribed(const carom_contact_problem *p, adjoint *a, double *cq)
 {
-    memset(a->f, 0, 3 * (size_t)p->n_bodies * sizeof(double));
+    int any = 0;
+    for (int i = 0; i < 3 * p->n_bodies; i++) any |= !(p->inv_mass[i] > 0);
+    if (!any) return;
     memset(cq, 0, 3 * (size_t)p->n_bodies * sizeof(double));
     for (int k = 0; k < p->n_contacts; k++) {
         const int *body = p->contact_body + 2 * k;
-        crm_row_add(a->f, p->jn + 6 * k, body, x->ln[k]);
-        crm_row_add(cq, p->jn + 6 * k, body, a->qn[k]);
-        if (!crm_has_friction(p, k)) continue;
-        crm_row_add(a->f, p->jt + 6 * k, body, x->lt[k]);
-        crm_row_add(cq, p->jt + 6 * k, body, a->qt[k]);
+        crm_row_add(cq, p->jn + 6 * k, body, a->cn[k]);
+        if (crm_has_friction(p, k)) crm_row_add(cq, p->jt + 6 * k, body, a->ct[k]);
     }
     for (int r = 0; r < p->n_joint_rows; r++) {
-        const int *body = p->joint_body + 2 * r;
-        crm_row_add(a->f, p->je + 6 * r, body, x->le[r]);
-        crm_row_add(cq, p->je + 6 * r, body, a->qe[r]);
+        crm_row_add(cq, p->je + 6 * r, p->joint_body + 2 * r, a->ce[r]);
     }
     for (int i = 0; i < 3 * p->n_bodies; i++) {
-        if (!(p->inv_mass[i] > 0)) a->p[i] -= cq[i];
+        if (!(p->inv_mass[i] > 0)) a->p[i] += cq[i];
     }
 }
 
-/* row_bar = l (W p)' - q v'; nothing for the world. */
+/* f = J' l. */
+static void find_forces(const carom_contact_problem *p, const carom_contact_solution *x, double *f)
+{
+    memset(f, 0, 3 * (size_t)p->n_bodies * sizeof *f);
+    for (int k = 0; k < p->n_contacts; k++) {
+        const int *body = p->contact_body + 2 * k;
+        crm_row_add(f, p->jn + 6 * k, body, x->ln[k]);
+        if (crm_has_friction(p, k)) crm_row_add(f, p->jt + 6 * k, body, x->lt[k]);
+    }
+    for (int r = 0; r < p->n_joint_rows; r++) {
+        crm_row_add(f, p->je + 6 * r, p->joint_body + 2 * r, x->le[r]);
+    }
+}
+
+/* row_bar = l (W p)' + c_bar v'; nothing for the world. */
 static void row_bar(const carom_contact_problem *p, const adjoint *a, const double *v,
-                    const int *body, double l, double q, double *bar)
+                    const int *body, double l, double c_bar, double *bar)
 {
     for (int i = 0; i < 6; i++) {
         const int at = 3 * body[i / 3] + i % 3;
-        bar[i] = body[i / 3] < 0 ? 0 : l * p->inv_mass[at] * a->p[at] - q * v[at];
+        bar[i] = body[i / 3] < 0 ? 0 : l * p->inv_mass[at] * a->p[at] + c_bar * v[at];
     }
 }
 
-static void write_contacts(const carom_contact_problem *p, const carom_contact_solution *x,
-                           const adjoint *a, carom_contact_bars *bars)
+static double mu_bar(const carom_contact_problem *p, const carom_contact_solution *x,
+                     const adjoint *a, int k)
 {
+    const double sign = crm_has_friction(p, k) ? crm_slip_sign(x->mode[k]) : 0;
+    double sum = 0;
+    for (int i = 0; i < 6 && sign != 0; i++) {
+        const int body = p->contact_body[2 * k + i / 3];
+        const int at = 3 * body + i % 3;
+        if (body >= 0) sum += p->jt[6 * k + i] * p->inv_mass[at] * a->p[at];
+    }
+    return sign * x->ln[k] * sum;
+}
+
+/* Of W, J and mu.  f: 3 n_bodies of room. */
+static void write_rest(const carom_contact_problem *p, const carom_contact_solution *x,
+                       const adjoint *a, double *f, const carom_contact_bars *bars)
+{
+    if (bars->inv_mass) {
+        find_forces(p, x, f);
+        for (int i = 0; i < 3 * p->n_bodies; i++) bars->inv_mass[i] = a->p[i] * f[i];
+    }
     for (int k = 0; k < p->n_contacts; k++) {
         const int *body = p->contact_body + 2 * k;
-        const int friction = crm_has_friction(p, k);
-        const double sign = friction ? crm_slip_sign(x->mode[k]) : 0;
-        if (bars->cn) bars->cn[k] = -a->qn[k];
-        if (bars->ct) bars->ct[k] = -a->qt[k];
-        if (bars->jn) row_bar(p, a, x->v, body, x->ln[k], a->qn[k], bars->jn + 6 * k);
-        if (bars->jt) {
-            const double lt = friction ? x->lt[k] : 0;
-            row_bar(p, a, x->v, body, lt, a->qt[k], bars->jt + 6 * k);
-        }
-        if (!bars->mu) continue;
-        bars->mu[k] = 0;
-        for (int i = 0; i < 6 && sign != 0; i++) {
-            const int at = 3 * body[i / 3] + i % 3;
-            if (body[i / 3] < 0) continue;
-            bars->mu[k] += sign * x->ln[k] * p->jt[6 * k + i] * p->inv_mass[at] * a->p[at];
-        }
+        const double lt = crm_has_friction(p, k) ? x->lt[k] : 0;
+        if (bars->jn) row_bar(p, a, x->v, body, x->ln[k], a->cn[k], bars->jn + 6 * k);
+        if (bars->jt) row_bar(p, a, x->v, body, lt, a->ct[k], bars->jt + 6 * k);
+        if (bars->mu) bars->mu[k] = mu_bar(p, x, a, k);
+    }
+    for (int r = 0; bars->je && r < p->n_joint_rows; r++) {
+        row_bar(p, a, x->v, p->joint_body + 2 * r, x->le[r], a->ce[r], bars->je + 6 * r);
     }
 }
 
-static void write_bars(const carom_contact_problem *p, const carom_contact_solution *x,
-                       const adjoint *a, carom_contact_bars *bars)
+static void give(double *to, const double *from, int n)
 {
-    for (int i = 0; i < 3 * p->n_bodies; i++) {
-        if (bars->u) bars->u[i] = a->p[i];
-        if (bars->inv_mass) bars->inv_mass[i] = a->p[i] * a->f[i];
-    }
-    write_contacts(p, x, a, bars);
-    for (int r = 0; r < p->n_joint_rows; r++) {
-        if (bars->ce) bars->ce[r] = -a->qe[r];
-        if (bars->je)
-            row_bar(p, a, x->v, p->joint_body + 2 * r, x->le[r], a->qe[r], bars->je + 6 * r);
-    }
+    if (to && n > 0) memcpy(to, from, (size_t)n * sizeof *to);
 }
 
-/* 9 per body, 2 per contact, 1 per joint row. */
+/* Of u and c. */
+static void write_sides(const carom_contact_problem *p, const adjoint *a,
+                        const carom_contact_bars *bars)
+{
+    give(bars->u, a->p, 3 * p->n_bodies);
+    give(bars->cn, a->cn, p->n_contacts);
+    give(bars->ct, a->ct, p->n_contacts);
+    give(bars->ce, a->ce, p->n_joint_rows);
+}
+
+/* 6 per body, 2 per contact, 1 per joint row. */
 static carom_status reserve_scratch(carom_contact_solver *c, const carom_contact_problem *p)
 {
-    const int n = 9 * p->n_bodies + 2 * p->n_contacts + p->n_joint_rows + 1;
+    const int n = 6 * p->n_bodies + 2 * p->n_contacts + p->n_joint_rows + 1;
     return crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, n, sizeof(double));
+}
+
+/* All islands are gathered; the scratch behind a has room for 3 n_bodies. */
+static carom_status respond(carom_contact_solver *c, const carom_contact_problem *p,
+                            const double *v_bar, double tol, adjoint *a)
+{
+    const int n = 3 * p->n_bodies;
+    memset(a->cn, 0, (size_t)(2 * p->n_contacts + p->n_joint_rows) * sizeof(double));
+    for (int i = 0; i < n; i++) a->p[i] = v_bar[i];
+    for (int i = 0; i < c->graph.n_islands; i++) solve_island(c, v_bar, tol, i, a);
+    prescribed(p, a, a->ce + p->n_joint_rows);
+    for (int i = 0; i < n; i++) {
+        if (!isfinite(a->p[i])) return CAROM_E_SINGULAR;
+    }
+    return CAROM_OK;
 }
 
 carom_status carom_contact_adjoint(carom_contact_solver *solver,
@@ -288,17 +353,39 @@ carom_status carom_contact_adjoint(carom_contact_solver *solver,
     if (s >= 0 && !crm_modes_valid(p, x->mode)) s = CAROM_E_ARGUMENT;
     if (s >= 0) s = reserve_scratch(solver, p);
     if (s >= 0) s = crm_solver_prepare(solver, p);
+    for (int i = 0; s >= 0 && i < solver->graph.n_islands; i++) {
+        crm_system_gather(&solver->system, &solver->graph, p, i);
+        crm_island y = crm_system_island(&solver->system, &solver->graph, &solver->pattern, i);
+        crm_system_set_modes(&solver->graph, &y, i, x->mode);
+    }
     if (s < 0) return s;
     adjoint a = carve(solver->scratch, p);
-    const int n = 3 * p->n_bodies;
-    memset(a.qn, 0, (size_t)(2 * p->n_contacts + p->n_joint_rows) * sizeof(double));
-    for (int i = 0; i < n; i++) a.p[i] = v_bar[i];
-    for (int i = 0; i < solver->graph.n_islands; i++)
-        solve_island(solver, p, x->mode, v_bar, i, &a);
-    finish(p, x, &a, a.qe + p->n_joint_rows);
-    for (int i = 0; i < n; i++) {
-        if (!isfinite(a.p[i])) return CAROM_E_SINGULAR;
-    }
-    write_bars(p, x, &a, bars);
+    s = respond(solver, p, v_bar, 0, &a);
+    if (s < 0) return s;
+    write_sides(p, &a, bars);
+    write_rest(p, x, &a, a.ce + p->n_joint_rows, bars);
+    return CAROM_OK;
+}
+
+carom_status carom_contact_adjoint_again(carom_contact_solver *solver,
+                                         const carom_contact_problem *problem, const double *v_bar,
+                                         double tol, carom_contact_bars *bars)
+{
+    if (!solver || !problem || !v_bar || !bars) return CAROM_E_ARGUMENT;
+    adjoint a = carve(solver->scratch, problem);
+    const carom_status s = respond(solver, problem, v_bar, tol, &a);
+    if (s >= 0) write_sides(problem, &a, bars);
+    return s;
+}
+
+carom_status carom_contact_adjoint_rest(carom_contact_solver *solver,
+                                        const carom_contact_problem *problem,
+                                        const carom_contact_solution *x, carom_contact_bars *bars)
+{
+    if (!solver || !problem || !x || !bars || !bars->u) return CAROM_E_ARGUMENT;
+    const carom_status s = reserve_scratch(solver, problem);
+    if (s < 0) return s;
+    const adjoint a = {bars->u, bars->cn, bars->ct, bars->ce};
+    write_rest(problem, x, &a, solver->scratch, bars);
     return CAROM_OK;
 }

@@ -152,8 +152,8 @@ void crm_island_solve_transposed(crm_island *s, double *x);
 void crm_island_reduce(crm_island *s, crm_vec r, crm_vec step);
 
 /* adjoint.c: of z - B l = 0, C z + c = 0 at s->mode: p + C' q = g, B' p = 0, with p in s->x.z and q
- * in s->x.n, s->x.t and behind the bodies, so that <g, z> = -<q, c>.  `extra` passes follow the one
- * that reached rounding of g. */
-void crm_island_adjoint(crm_island *s, const double *g, int extra);
+ * in s->x.n, s->x.t and behind the bodies, so that <g, z> = -<q, c>, to within tol of the
+ * largest entry of g; `extra` passes follow the one that reached that, or rounding. */
+void crm_island_adjoint(crm_island *s, const double *g, double tol, int extra);
 
 #endif

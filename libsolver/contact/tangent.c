@@ -175,22 +175,19 @@ static void transpose_adjoint(crm_island *s, double *z, double *unit)
     for (int i = 0; i < 3 * s->nb; i++) unit[i] = 0;
     for (int i = 0; i < 3 * s->nb; i++) {
         unit[i] = 1;
-        crm_island_adjoint(s, unit, 0);
+        crm_island_adjoint(s, unit, 0, 0);
         unit[i] = 0;
         z[i] = -answer(s);
     }
 }
 
-/* e += W B dl of one island. */
-static void solve_island(carom_contact_solver *c, const carom_contact_problem *p,
-                         const unsigned char *mode, int island, tangent *t)
+/* e += W B dl of one island, whose values and modes are gathered. */
+static void solve_island(carom_contact_solver *c, int island, tangent *t)
 {
     const crm_graph *g = &c->graph;
-    crm_system_gather(&c->system, g, p, island);
     const double size = set_constants(&c->system, g, island, t);
     if (!(size > 0)) return;
     crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
-    crm_system_set_modes(g, &s, island, mode);
     crm_vec_zero(&s, s.x);
     crm_solve_modes(&s, CRM_PASSES);
     double *z = s.x.z;
@@ -211,6 +208,24 @@ static carom_status reserve_scratch(carom_contact_solver *c, const carom_contact
     return crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, n, sizeof(double));
 }
 
+carom_status carom_contact_tangent_again(carom_contact_solver *solver,
+                                         const carom_contact_problem *problem,
+                                         const carom_contact_solution *x,
+                                         const carom_contact_direction *direction, double *dv)
+{
+    const carom_contact_problem *p = problem;
+    if (!solver || !p || !x || !direction || !dv) return CAROM_E_ARGUMENT;
+    tangent t = carve(solver->scratch, p);
+    find_motion(p, x, direction, &t);
+    find_rows(p, x, direction, &t);
+    for (int i = 0; i < solver->graph.n_islands; i++) solve_island(solver, i, &t);
+    for (int i = 0; i < 3 * p->n_bodies; i++) {
+        if (!isfinite(t.e[i])) return CAROM_E_SINGULAR;
+    }
+    for (int i = 0; i < 3 * p->n_bodies; i++) dv[i] = t.e[i];
+    return CAROM_OK;
+}
+
 carom_status carom_contact_tangent(carom_contact_solver *solver,
                                    const carom_contact_problem *problem,
                                    const carom_contact_solution *x,
@@ -223,14 +238,10 @@ carom_status carom_contact_tangent(carom_contact_solver *solver,
     if (s >= 0 && !crm_modes_valid(p, x->mode)) s = CAROM_E_ARGUMENT;
     if (s >= 0) s = reserve_scratch(solver, p);
     if (s >= 0) s = crm_solver_prepare(solver, p);
-    if (s < 0) return s;
-    tangent t = carve(solver->scratch, p);
-    find_motion(p, x, direction, &t);
-    find_rows(p, x, direction, &t);
-    for (int i = 0; i < solver->graph.n_islands; i++) solve_island(solver, p, x->mode, i, &t);
-    for (int i = 0; i < 3 * p->n_bodies; i++) {
-        if (!isfinite(t.e[i])) return CAROM_E_SINGULAR;
+    for (int i = 0; s >= 0 && i < solver->graph.n_islands; i++) {
+        crm_system_gather(&solver->system, &solver->graph, p, i);
+        crm_island y = crm_system_island(&solver->system, &solver->graph, &solver->pattern, i);
+        crm_system_set_modes(&solver->graph, &y, i, x->mode);
     }
-    for (int i = 0; i < 3 * p->n_bodies; i++) dv[i] = t.e[i];
-    return CAROM_OK;
+    return s < 0 ? s : carom_contact_tangent_again(solver, p, x, direction, dv);
 }

@@ -140,27 +140,24 @@ void crm_drive_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, dou
 }
 
 /* c_e = (measure(p) - measure(q0)) / h - speed - J v; the speed and J are in motor_vjp. */
-void crm_motor_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int row, const double *v,
-                        const double *p, double *v_bar, double *q0_bar, double *h_bar,
-                        int with_parameters)
+void crm_motor_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int row, double *q0_bar,
+                        double *h_bar, int with_parameters)
 {
     const crm_joint *j = &r->world->joints[joint];
     const crm_measure m = crm_motor_measure(j->kind);
     const double ce_bar = r->bars.ce[row];
     crm_joint_bar bar = {{{0, 0}, {0, 0}}, 0, 0, 0};
     double je[6];
-    double end[6];
     double row_bar[6];
     if (s->solve[0].motor[row] != CRM_MOTOR_HOLDS) return;
     const double before = crm_measure_at(j, m, s->q0, je);
-    const double way = crm_measure_at(j, m, p, end) - before;
+    const double way = crm_measure_at(j, m, r->pose, je) - before;
     for (int k = 0; k < 6; k++) {
         const int at = 3 * (k < 3 ? j->body_a : j->body_b) + k % 3;
-        v_bar[at] -= ce_bar * je[k];
-        row_bar[k] = -ce_bar * v[at];
+        row_bar[k] = -ce_bar * s->solve[0].v[at];
     }
     *h_bar -= ce_bar * way / (s->h * s->h);
-    crm_measure_vjp(j, m, p, NULL, ce_bar / s->h, r->pose_bar, &bar);
+    crm_measure_vjp(j, m, r->pose, NULL, ce_bar / s->h, r->pose_bar, &bar);
     crm_measure_vjp(j, m, s->q0, row_bar, -ce_bar / s->h, q0_bar, &bar);
     if (with_parameters) crm_joint_give(r, joint, &bar);
 }

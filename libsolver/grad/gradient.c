@@ -7,6 +7,16 @@
  * numbers that have lost their normal form make every product slow. */
 static const double NEGLIGIBLE = 1e-200;
 
+/* One behind the other. */
+static void lay_sides(carom_contact_bars *bars, crm_block *b, size_t k3, size_t m, size_t rows)
+{
+    double *at = crm_carve(b, k3 + 2 * m + rows, sizeof(double));
+    bars->u = at;
+    bars->cn = at ? at + k3 : NULL;
+    bars->ct = at ? bars->cn + m : NULL;
+    bars->ce = at ? bars->ct + m : NULL;
+}
+
 static void lay(crm_reverse *r, crm_block *b, size_t m)
 {
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
@@ -24,15 +34,17 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     r->clock_bar = crm_carve(b, (size_t)r->world->n_bodies, sizeof(double));
     r->clock_old = crm_carve(b, (size_t)r->world->n_bodies, sizeof(double));
     r->velocity_bar = crm_carve(b, k3, sizeof(double));
-    r->bars.u = crm_carve(b, k3, sizeof(double));
+    lay_sides(&r->bars, b, k3, m, rows);
+    lay_sides(&r->total, b, k3, m, rows);
+    r->n_sides = k3 + 2 * m + rows;
     r->bars.inv_mass = crm_carve(b, k3, sizeof(double));
     r->bars.jn = crm_carve(b, 6 * m, sizeof(double));
     r->bars.jt = crm_carve(b, 6 * m, sizeof(double));
     r->bars.mu = crm_carve(b, m, sizeof(double));
-    r->bars.cn = crm_carve(b, m, sizeof(double));
     r->bars.je = crm_carve(b, 6 * rows, sizeof(double));
-    r->bars.ct = crm_carve(b, m, sizeof(double));
-    r->bars.ce = crm_carve(b, rows, sizeof(double));
+    r->turn.n = crm_carve(b, 6 * m, sizeof(double));
+    r->turn.t = crm_carve(b, 6 * m, sizeof(double));
+    r->turn.e = crm_carve(b, 6 * rows, sizeof(double));
     r->moved = crm_carve(b, m, sizeof *r->moved);
     r->gap_bar = crm_carve(b, m, sizeof(double));
 }
@@ -274,6 +286,8 @@ carom_status crm_gradient_span(carom_tape *t, int from, int to, int n_bars,
     r.sink.g = *gradient;
     r.from = from;
     r.to = to;
+    r.wants_shapes = gradient->radius || gradient->vertices;
+    r.wants_joints = gradient->anchors || gradient->axes || gradient->angles || gradient->lengths;
     carom_status e = allocate(&r);
     if (!e) e = reverse_span(&r, n_bars, bars);
     crm_free(&t->memory, r.block, r.bytes, 1);

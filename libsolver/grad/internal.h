@@ -85,6 +85,17 @@ typedef struct crm_unpacked {
     double *solve_q[CRM_MAX_SOLVES], *solve_v[CRM_MAX_SOLVES];
 } crm_unpacked;
 
+/* What the rows at the end of a stage 1 have more than those at its start, 6 numbers each: an
+ * iteration answers a change x of its velocity with right-hand sides that change by these times x.
+ */
+typedef struct crm_turn {
+    double *n, *t; /* per contact; 0 where there is no friction */
+    double *e;     /* per joint row */
+} crm_turn;
+/* smooth.c: first with the rows at the end p of stage 1 in place, then with those at its start. */
+void crm_turn_end(const carom_world *w, const crm_substep *s, const double *p, crm_turn *turn);
+void crm_turn_start(const carom_world *w, const crm_substep *s, crm_turn *turn);
+
 /* Workspace of a reverse pass. */
 typedef struct crm_reverse {
     carom_tape *tape;
@@ -94,9 +105,15 @@ typedef struct crm_reverse {
     double scale;          /* largest seed so far */
     double *q_bar, *v_bar; /* 3 n_bodies: state under way */
     double *q_seed, *v_seed;
-    double *velocity_bar; /* 3 per body of the island */
-    double *gap_bar;      /* per contact */
-    carom_contact_bars bars;
+    double *velocity_bar;            /* 3 per body of the island */
+    double *gap_bar;                 /* per contact */
+    carom_contact_bars bars;         /* of the solve under way, in one block, so that they add up */
+    carom_contact_bars total;        /* of all passes of stage 1: u and sides */
+    size_t n_sides;                  /* numbers of u, cn, ct and ce, one behind the other */
+    carom_contact_problem problem;   /* of the solve under way */
+    carom_contact_solution solution; /* likewise */
+    crm_turn turn;
+    int wants_shapes, wants_joints; /* 1: radii or vertices; anchors, axes, angles or lengths */
     double *solve_bar;           /* 3 n_bodies: cotangent of the velocity of the solve under way */
     double *late_bar;            /* 3 n_bodies: of v0, through the springs of stage 2 */
     double *pose;                /* 3 n_bodies: end of an iteration of stage 1 */
@@ -176,14 +193,19 @@ void crm_joint_give(const crm_reverse *r, int joint, const crm_joint_bar *bar);
  * crm_mass_vjp.  v_bar: of the velocity before the solve (of stage 2: of vh, and r->late_bar). */
 void crm_drive_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *v_bar,
                    double *q_bar, double *h_bar, int with_parameters);
-/* The row of a motor that holds, in an iteration of stage 1: as joint_side_vjp. */
-void crm_motor_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int row, const double *v,
-                        const double *p, double *v_bar, double *q0_bar, double *h_bar,
-                        int with_parameters);
+/* The row of a motor that holds, in an iteration of stage 1 that ends at r->pose. */
+void crm_motor_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int row, double *q0_bar,
+                        double *h_bar, int with_parameters);
 
 /* reverse.c: the adjoint of one solve. */
-/* Reverse derivative of solve c with the cotangent v_bar of its velocity: fills r->bars.  Masses go
- * to the sink with with_parameters, except what u depends on them. */
+/* Problem and solution of solve c of s; rows in place. */
+void crm_pose_solve(crm_reverse *r, crm_substep *s, const crm_solve *c);
+/* Reverse derivative of that solve with the cotangent v_bar of its velocity: u and sides of
+ * r->bars. tol > 0: another one of the same solve, to within tol of the largest entry of v_bar. */
+carom_status crm_sides_vjp(crm_reverse *r, const double *v_bar, double tol);
+/* The rest of r->bars, from u and sides. */
+carom_status crm_rest_vjp(crm_reverse *r);
+/* All of it. */
 carom_status crm_solve_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, const double *v_bar);
 /* u = v + h (W f + g): u_bar to v_bar, h_bar (times share = dh / dstep), forces, gravity, masses.
  */
@@ -240,16 +262,6 @@ typedef struct crm_line {
 typedef struct crm_problem_dot {
     double *inv_mass, *u, *jn, *jt, *mu, *cn, *ct, *je, *ce;
 } crm_problem_dot;
-
-/* What the rows at the end of a stage 1 have more than those at its start, 6 numbers each: an
- * iteration answers a change x of its velocity with right-hand sides that change by these times x.
- */
-typedef struct crm_turn {
-    double *n, *t; /* per contact; 0 where there is no friction */
-    double *e;     /* per joint row */
-} crm_turn;
-/* smooth.c: of the stage 1 that ends at p, its rows in place. */
-void crm_turn_of_rows(const carom_world *w, const crm_substep *s, const double *p, crm_turn *turn);
 
 /* Workspace of a forward pass.  Lines share the factors of every problem. */
 typedef struct crm_forward {

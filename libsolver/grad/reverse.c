@@ -3,21 +3,45 @@
 
 #include <math.h>
 
-carom_status crm_solve_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, const double *v_bar)
+void crm_pose_solve(crm_reverse *r, crm_substep *s, const crm_solve *c)
 {
     carom_world *w = r->world;
-    const carom_contact_problem p = crm_solve_problem(w, s, c);
-    if (!p.n_contacts && !p.n_joint_rows) {
-        crm_gather(w, v_bar, r->bars.u);
-        memset(r->bars.inv_mass, 0, 3 * (size_t)p.n_bodies * sizeof(double));
+    r->problem = crm_solve_problem(w, s, c);
+    crm_gather(w, c->v, w->rows.v);
+    const carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
+    r->solution = x;
+}
+
+carom_status crm_sides_vjp(crm_reverse *r, const double *v_bar, double tol)
+{
+    carom_contact_solver *solver = r->world->solver;
+    carom_contact_bars sides = {0};
+    sides.u = r->bars.u;
+    sides.cn = r->bars.cn;
+    sides.ct = r->bars.ct;
+    sides.ce = r->bars.ce;
+    if (!r->problem.n_contacts && !r->problem.n_joint_rows) {
+        crm_gather(r->world, v_bar, r->bars.u);
         return CAROM_OK;
     }
-    crm_gather(w, c->v, w->rows.v);
-    crm_gather(w, v_bar, r->velocity_bar);
-    const carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
-    const carom_status e = carom_contact_adjoint(w->solver, &p, &x, r->velocity_bar, &r->bars);
+    crm_gather(r->world, v_bar, r->velocity_bar);
     r->stats.solves++;
-    return e;
+    if (tol > 0) {
+        return carom_contact_adjoint_again(solver, &r->problem, r->velocity_bar, tol, &sides);
+    }
+    return carom_contact_adjoint(solver, &r->problem, &r->solution, r->velocity_bar, &sides);
+}
+
+carom_status crm_rest_vjp(crm_reverse *r)
+{
+    return carom_contact_adjoint_rest(r->world->solver, &r->problem, &r->solution, &r->bars);
+}
+
+carom_status crm_solve_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, const double *v_bar)
+{
+    crm_pose_solve(r, s, c);
+    const carom_status e = crm_sides_vjp(r, v_bar, 0);
+    return e < 0 ? e : crm_rest_vjp(r);
 }
 
 /* W = 1 / m: m_bar = -W_bar / m^2. */

@@ -1,8 +1,8 @@
-/* smooth.c: the two-stage map backward.  Stage 1 ends at the fixed point v = G(v) of a Newton
- * iteration with fixed rows.  Its adjoint is the sum of the passes l, G'l, G'G'l, ..., which
- * converges as the iteration did; every pass adds what G depends on.  Where that is slow or
- * diverges, the sum m = l + G'm is found by Anderson's method, for a linear map as good as GMRES
- * over the last iterates, and one pass over m adds all. */
+/* smooth.c: the two-stage map backward and forward.  Stage 1 ends at the fixed point v = G(v) of a
+ * Newton iteration with fixed rows.  Its adjoint is that of one iteration with the cotangent
+ * l + G'l + G'G'l + ..., a sum that converges as the iteration did; G' needs a transposed solve and
+ * the rows at the end of the sub-step.  Where that is slow or diverges, the sum m = l + G'm is
+ * found by Anderson's method, for a linear map as good as GMRES over the last iterates. */
 #include "grad/internal.h"
 
 #include <math.h>
@@ -12,6 +12,7 @@ static const double PASS_TOL = 1e-15;
 enum { MAX_PASSES = 60 };
 /* Where a pass leaves more than this of the rest, the sum is found otherwise [1]. */
 static const double SLOW = 0.3;
+static const double SPARE = 1e-2;
 /* A rest above this after all passes: no gradient rather than a wrong one. */
 static const double PASS_LOOSE = 1e-9;
 
@@ -31,138 +32,191 @@ static void add_outer(double row_bar[6], int body_a, int body_b, const double *v
     }
 }
 
-/* c_n = (gap(p) - target) / h - J_n v, c_t = slip(q0, p) / h - J_t v: one contact of an iteration
- * after the one that ended at p = q0 + h v.  Adds to v_bar, rows, p_bar, q0_bar, h_bar, gap_bar. */
-static void contact_side_vjp(crm_reverse *r, const crm_substep *s, int k, const double *v,
-                             const double *p, double *v_bar, double *q0_bar, double *h_bar,
-                             int with_parameters)
+/* Of a contact at gap 0 the slip's row is that of J_t; from this gap on they differ [L]. */
+static const double CLOSED = 1e-14;
+
+/* d slip / dq1 of contact x at q, whose row of J_t is jt. */
+static void slip_row(const carom_world *w, const crm_contact *x, const double *q, const double *jt,
+                     double *row)
+{
+    if (fabs(x->gap) > CLOSED * w->length) {
+        crm_slip_row(w, x, q, row);
+    } else {
+        memcpy(row, jt, 6 * sizeof *row);
+    }
+}
+
+/* gap(p) and slip(q0, p) at the end of stage 1, by the poses and what shapes are made of. */
+static void end_of_contact_vjp(crm_reverse *r, const crm_substep *s, int k, double gap_bar,
+                               double slip_bar, double *q0_bar)
+{
+    const crm_contact *x = &s->contacts[k];
+    const carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, gap_bar};
+    crm_geometry_vjp(r, r->pose, x, &bar, r->pose_bar, 1);
+    if (slip_bar != 0) crm_slip_vjp(r, x, s->q0, r->pose, slip_bar, q0_bar, r->pose_bar, 1);
+}
+
+/* The same by the poses alone: rows at both ends. */
+static void end_of_rows_vjp(crm_reverse *r, const crm_substep *s, int k, double gap_bar,
+                            double slip_bar, double *q0_bar)
+{
+    const crm_rows *rows = &r->world->rows;
+    const crm_contact *x = &s->contacts[k];
+    double row[6];
+    for (int i = 0; i < 6; i++) {
+        row[i] = gap_bar * (rows->jn[6 * k + i] + r->turn.n[6 * k + i]) +
+                 slip_bar * (rows->jt[6 * k + i] + r->turn.t[6 * k + i]);
+    }
+    add_row(r->pose_bar, x->body_a, x->body_b, row, 1);
+    if (slip_bar == 0) return;
+    slip_row(r->world, x, s->q0, &rows->jt[6 * k], row);
+    add_row(q0_bar, x->body_a, x->body_b, row, -slip_bar);
+}
+
+/* c_n = (gap(p) - target) / h - J_n v, c_t = slip(q0, p) / h - J_t v of one contact, at the fixed
+ * point, which ends at p = q0 + h v and where rows that hold miss nothing: gap(p) = target and slip
+ * = 0, so that 1 / h has no part.  Adds to rows, r->pose_bar, q0_bar, h_bar, gap_bar. */
+static void contact_side_vjp(crm_reverse *r, const crm_substep *s, int k, double *q0_bar,
+                             double *h_bar, int with_parameters)
 {
     const carom_world *w = r->world;
+    const double *v = s->solve[0].v;
+    const double h = s->h;
     const double cn_bar = r->bars.cn[k];
     const double ct_bar = w->rows.mu[k] > 0 ? r->bars.ct[k] : 0;
     crm_contact x = s->contacts[k];
-    const int a = x.body_a;
-    const int b = x.body_b;
-    add_row(v_bar, a, b, &w->rows.jn[6 * k], -cn_bar);
-    add_row(v_bar, a, b, &w->rows.jt[6 * k], -ct_bar);
-    add_outer(&r->bars.jn[6 * k], a, b, v, -cn_bar);
-    add_outer(&r->bars.jt[6 * k], a, b, v, -ct_bar);
-    crm_contact_refresh(w, p, &x);
-    const carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, cn_bar / s->h};
-    crm_geometry_vjp(r, p, &x, &bar, r->pose_bar, with_parameters);
-    *h_bar -= cn_bar * (x.gap - s->target[k]) / (s->h * s->h);
-    if (s->target[k] != 0) {
-        r->gap_bar[k] -= cn_bar / s->h;
-        *h_bar -= cn_bar * w->recovery / s->h;
+    if (cn_bar == 0 && ct_bar == 0) return;
+    add_outer(&r->bars.jn[6 * k], x.body_a, x.body_b, v, -cn_bar);
+    add_outer(&r->bars.jt[6 * k], x.body_a, x.body_b, v, -ct_bar);
+    if (with_parameters && (x.limit || r->wants_shapes)) {
+        end_of_contact_vjp(r, s, k, cn_bar / h, ct_bar / h, q0_bar);
+    } else {
+        end_of_rows_vjp(r, s, k, cn_bar / h, ct_bar / h, q0_bar);
     }
-    if (ct_bar == 0) return;
-    *h_bar -= ct_bar * crm_slip(w, &x, s->q0, p) / (s->h * s->h);
-    crm_slip_vjp(r, &x, s->q0, p, ct_bar / s->h, q0_bar, r->pose_bar, with_parameters);
+    if (s->target[k] != 0) {
+        r->gap_bar[k] -= cn_bar / h;
+        *h_bar -= cn_bar * w->recovery / h;
+    }
 }
 
 /* c_e = (error(p) - target) / h - J_e v of one joint, whose first row in the island is `first`;
  * target = error(q0) -+ recovery h, or 0. */
 static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int first,
-                           const double *v, const double *p, double *v_bar, double *q0_bar,
-                           double *h_bar, int with_parameters)
+                           double *q0_bar, double *h_bar, int with_parameters)
 {
     const carom_world *w = r->world;
     const crm_joint *j = &w->joints[joint];
-    double je[6 * CRM_MAX_JOINT_ROWS];
-    double error[CRM_MAX_JOINT_ROWS];
+    const double *v = s->solve[0].v;
+    const double h = s->h;
     double error_bar[CRM_MAX_JOINT_ROWS];
     double start_bar[CRM_MAX_JOINT_ROWS];
-    crm_joint_rows(j, p, je, error);
+    int targets = 0;
     for (int i = 0; i < j->n_held; i++) {
         const int row = first + i;
         const double ce_bar = r->bars.ce[row];
-        add_row(v_bar, j->body_a, j->body_b, &w->rows.je[6 * row], -ce_bar);
         add_outer(&r->bars.je[6 * row], j->body_a, j->body_b, v, -ce_bar);
         const double target = s->joint_target[row];
-        error_bar[i] = ce_bar / s->h;
-        start_bar[i] = target != 0 ? -ce_bar / s->h : 0;
-        *h_bar -= ce_bar * (error[i] - target) / (s->h * s->h);
-        if (target != 0) *h_bar += ce_bar * copysign(w->recovery, target) / s->h;
+        error_bar[i] = ce_bar / h;
+        start_bar[i] = target != 0 ? -ce_bar / h : 0;
+        targets |= target != 0;
+        if (target != 0) *h_bar += ce_bar * copysign(w->recovery, target) / h;
+        if (with_parameters && r->wants_joints) continue;
+        add_row(r->pose_bar, j->body_a, j->body_b, &w->rows.je[6 * row], error_bar[i]);
+        add_row(r->pose_bar, j->body_a, j->body_b, &r->turn.e[6 * row], error_bar[i]);
     }
-    crm_joint_vjp(r, p, joint, NULL, error_bar, r->pose_bar, with_parameters);
-    crm_joint_vjp(r, s->q0, joint, NULL, start_bar, q0_bar, with_parameters);
+    if (with_parameters && r->wants_joints) {
+        crm_joint_vjp(r, r->pose, joint, NULL, error_bar, r->pose_bar, 1);
+    }
+    if (targets) crm_joint_vjp(r, s->q0, joint, NULL, start_bar, q0_bar, with_parameters);
     if (j->n_rows > j->n_held) {
-        crm_motor_side_vjp(r, s, joint, first + j->n_held, v, p, v_bar, q0_bar, h_bar,
-                           with_parameters);
+        crm_motor_side_vjp(r, s, joint, first + j->n_held, q0_bar, h_bar, with_parameters);
     }
 }
 
-static void turn_of_joint(const carom_world *w, const crm_substep *s, int joint, int first,
-                          const double *p, double *turn)
+void crm_turn_end(const carom_world *w, const crm_substep *s, const double *p, crm_turn *turn)
 {
-    const crm_joint *j = &w->joints[joint];
-    double error[CRM_MAX_JOINT_ROWS];
-    crm_joint_rows(j, p, turn, error);
-    const int motor =
-        j->n_rows > j->n_held && s->solve[0].motor[first + j->n_held] == CRM_MOTOR_HOLDS;
-    if (motor) crm_measure_at(j, crm_motor_measure(j->kind), p, &turn[6 * j->n_held]);
-    for (int i = 0; i < 6 * j->n_rows; i++) turn[i] -= w->rows.je[6 * first + i];
-}
-
-void crm_turn_of_rows(const carom_world *w, const crm_substep *s, const double *p, crm_turn *turn)
-{
+    const crm_rows *rows = &w->rows;
     for (int k = 0; k < s->n_contacts; k++) {
-        crm_contact x = s->contacts[k];
-        double *n = &turn->n[6 * k];
-        double *t = &turn->t[6 * k];
-        crm_contact_refresh(w, p, &x);
-        crm_contact_rows(&x, n, t);
-        if (w->rows.mu[k] > 0) crm_slip_row(w, &x, p, t);
-        for (int i = 0; i < 6; i++) {
-            n[i] -= w->rows.jn[6 * k + i];
-            t[i] = w->rows.mu[k] > 0 ? t[i] - w->rows.jt[6 * k + i] : 0;
-        }
+        memcpy(&turn->n[6 * k], &rows->jn[6 * k], 6 * sizeof(double));
+        if (!(rows->mu[k] > 0)) continue;
+        slip_row(w, &s->moved[k], p, &rows->jt[6 * k], &turn->t[6 * k]);
     }
     int row = 0;
     for (int k = 0; k < w->island->n_joints; k++) {
-        const int joint = w->island->joints[k];
-        turn_of_joint(w, s, joint, row, p, &turn->e[6 * row]);
-        row += w->joints[joint].n_rows;
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        double *e = &turn->e[6 * row];
+        memcpy(e, &rows->je[6 * row], 6 * (size_t)j->n_rows * sizeof *e);
+        row += j->n_rows;
+        if (j->n_rows == j->n_held) continue;
+        const int holds = s->solve[0].motor[row - 1] == CRM_MOTOR_HOLDS;
+        e += 6 * j->n_held;
+        if (holds) crm_measure_at(j, crm_motor_measure(j->kind), p, e);
+        if (!holds) memset(e, 0, 6 * sizeof *e);
     }
 }
 
-/* Right-hand sides from the velocity v of the fixed point, which ends at p = q0 + h v. */
-static void sides_vjp(crm_reverse *r, const crm_substep *s, const double *v, double *v_bar,
-                      double *q0_bar, double *h_bar, int with_parameters)
+void crm_turn_start(const carom_world *w, const crm_substep *s, crm_turn *turn)
+{
+    const crm_rows *rows = &w->rows;
+    for (int k = 0; k < s->n_contacts; k++) {
+        const int rough = rows->mu[k] > 0;
+        for (int i = 6 * k; i < 6 * k + 6; i++) {
+            turn->n[i] -= rows->jn[i];
+            turn->t[i] = rough ? turn->t[i] - rows->jt[i] : 0;
+        }
+    }
+    for (int i = 0; i < 6 * w->island->n_rows; i++) turn->e[i] -= rows->je[i];
+}
+
+/* Right-hand sides at the fixed point, from r->bars. */
+static void sides_vjp(crm_reverse *r, const crm_substep *s, double *q0_bar, double *h_bar,
+                      int with_parameters)
 {
     const carom_world *w = r->world;
-    double *p = r->pose;
-    crm_copy(w, p, s->q0);
-    crm_move(w, p, v, s->h);
     memset(r->pose_bar, 0, 3 * (size_t)w->n_bodies * sizeof(double));
     for (int k = 0; k < s->n_contacts; k++) {
         r->gap_bar[k] = 0;
-        contact_side_vjp(r, s, k, v, p, v_bar, q0_bar, h_bar, with_parameters);
+        contact_side_vjp(r, s, k, q0_bar, h_bar, with_parameters);
     }
     int row = 0;
     for (int k = 0; k < w->island->n_joints; k++) {
         const int joint = w->island->joints[k];
-        joint_side_vjp(r, s, joint, row, v, p, v_bar, q0_bar, h_bar, with_parameters);
+        joint_side_vjp(r, s, joint, row, q0_bar, h_bar, with_parameters);
         row += w->joints[joint].n_rows;
     }
-    crm_move_vjp(w, s, v, r->pose_bar, v_bar, h_bar);
-    for (int k = 0; k < 3 * w->n_bodies; k++) q0_bar[k] += r->pose_bar[k];
+    for (int k = 0; k < 3 * w->n_bodies; k++) {
+        *h_bar += r->pose_bar[k] * s->solve[0].v[k];
+        q0_bar[k] += r->pose_bar[k];
+    }
 }
 
-/* One pass: r->solve_bar becomes G' r->solve_bar. */
-static carom_status pass_vjp(crm_reverse *r, crm_substep *s, double *q0_bar, double *v0_bar,
-                             int with_parameters, double *h_bar)
+/* One pass: the cotangent x of the velocity of an iteration, through the next right-hand sides to
+ * that of the velocity before it, to.  tol: as in crm_sides_vjp. */
+static carom_status pass_vjp(crm_reverse *r, const crm_substep *s, const double *x, double *to,
+                             double tol)
 {
-    const crm_solve *c = &s->solve[0];
-    const carom_status e = crm_solve_vjp(r, s, c, r->solve_bar);
+    const carom_world *w = r->world;
+    const carom_status e = crm_sides_vjp(r, x, tol);
     if (e < 0) return e;
-    crm_zero(r->world, r->solve_bar);
-    crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, v0_bar, h_bar, with_parameters);
-    crm_drive_vjp(r, s, c, v0_bar, q0_bar, h_bar, with_parameters);
-    if (with_parameters) crm_mass_vjp(r);
-    sides_vjp(r, s, c->v, r->solve_bar, q0_bar, h_bar, with_parameters);
-    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q0_bar, with_parameters);
+    crm_zero(w, to);
+    for (int k = 0; k < s->n_contacts; k++) {
+        const crm_contact *c = &s->contacts[k];
+        add_row(to, c->body_a, c->body_b, &r->turn.n[6 * k], r->bars.cn[k]);
+        add_row(to, c->body_a, c->body_b, &r->turn.t[6 * k], r->bars.ct[k]);
+    }
+    int row = 0;
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        for (int i = 0; i < j->n_rows; i++, row++) {
+            add_row(to, j->body_a, j->body_b, &r->turn.e[6 * row], r->bars.ce[row]);
+        }
+    }
     return CAROM_OK;
+}
+
+static void add_to_total(crm_reverse *r)
+{
+    for (size_t i = 0; i < r->n_sides; i++) r->total.u[i] += r->bars.u[i];
 }
 
 static double largest(const carom_world *w, const double *x)
@@ -231,68 +285,80 @@ static carom_status bounce_vjp(crm_reverse *r, crm_substep *s, double *q_bar, do
     return CAROM_OK;
 }
 
-static void pack(const carom_world *w, const double *full, double *x)
-{
-    for (int i = 0; i < w->island->n_bodies; i++) {
-        memcpy(&x[3 * i], &full[3 * w->island->bodies[i]], 3 * sizeof *x);
-    }
-}
-
-static void unpack(const carom_world *w, const double *x, double *full)
-{
-    for (int i = 0; i < w->island->n_bodies; i++) {
-        memcpy(&full[3 * w->island->bodies[i]], &x[3 * i], 3 * sizeof *x);
-    }
-}
-
 /* r->solve_bar = l becomes the solution of m = l + G'm, known to within tol. */
-static carom_status sum_passes(crm_reverse *r, crm_substep *s, double tol, double loose)
+static carom_status sum_passes(crm_reverse *r, const crm_substep *s, double tol, double loose)
 {
     carom_world *w = r->world;
     crm_anderson *a = &w->anderson;
     const int n = 3 * w->island->n_bodies;
-    double none = 0;
     double error = HUGE_VAL;
     carom_status e = crm_anderson_start(&w->memory, a, n);
     if (e < 0) return e;
     crm_copy(w, r->rest, r->solve_bar);
-    pack(w, r->rest, a->point);
+    crm_gather(w, r->rest, a->point);
     for (int k = 0; k < MAX_PASSES && error > tol; k++) {
-        unpack(w, a->point, r->solve_bar);
-        e = pass_vjp(r, s, r->spare_q, r->spare_v, 0, &none);
+        crm_scatter(w, a->point, r->solve_bar);
+        e = pass_vjp(r, s, r->solve_bar, r->solve_bar, PASS_TOL);
         if (e < 0) return e;
-        for (int i = 0; i < 3 * w->n_bodies; i++) r->spare_q[i] = r->spare_v[i] = 0;
-        pack(w, r->rest, a->value);
+        crm_gather(w, r->solve_bar, a->value);
         error = 0;
         for (int i = 0; i < n; i++) {
-            a->value[i] += r->solve_bar[3 * w->island->bodies[i / 3] + i % 3];
+            a->value[i] += r->rest[3 * w->island->bodies[i / 3] + i % 3];
             error = fmax(error, fabs(a->value[i] - a->point[i]));
         }
         if (!(error < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
         crm_anderson_next(a);
     }
-    unpack(w, a->point, r->solve_bar);
+    crm_scatter(w, a->point, r->solve_bar);
     return error <= loose ? CAROM_OK : CAROM_E_NO_SOLUTION;
+}
+
+/* Sum of the passes from the cotangent r->solve_bar = l of the velocity: r->total. */
+static carom_status close_vjp(crm_reverse *r, const crm_substep *s)
+{
+    const carom_world *w = r->world;
+    const double first = largest(w, r->solve_bar);
+    double last = HUGE_VAL;
+    memset(r->total.u, 0, r->n_sides * sizeof(double));
+    for (int k = 0; k < MAX_PASSES; k++) {
+        const double rest = largest(w, r->solve_bar);
+        if (k > 0 && rest <= PASS_TOL * first) return CAROM_OK;
+        if (!(rest < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
+        const int slow = k > 1 && rest > SLOW * last;
+        /* What is left needs fewer digits; SPARE, for masses differ. */
+        const double tol = k > 0 ? PASS_TOL * (slow ? 1 : SPARE * first / rest) : 0;
+        carom_status e = CAROM_OK;
+        if (slow) e = sum_passes(r, s, PASS_TOL * first, PASS_LOOSE * fmax(first, rest));
+        if (e >= 0) e = pass_vjp(r, s, r->solve_bar, r->solve_bar, tol);
+        if (e >= 0) add_to_total(r);
+        if (e < 0 || slow) return e;
+        last = rest;
+    }
+    return largest(w, r->solve_bar) <= PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
 }
 
 /* Stage 1 backward from the cotangent r->solve_bar of its velocity. */
 static carom_status stage_1_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
                                 int with_parameters, double *h_bar)
 {
-    const double first = largest(r->world, r->solve_bar);
-    double last = HUGE_VAL;
-    for (int k = 0; k < MAX_PASSES; k++) {
-        const double rest = largest(r->world, r->solve_bar);
-        if (rest <= PASS_TOL * first) return CAROM_OK;
-        if (!(rest < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
-        const int slow = k > 1 && rest > SLOW * last;
-        carom_status e = CAROM_OK;
-        if (slow) e = sum_passes(r, s, PASS_TOL * first, PASS_LOOSE * fmax(first, rest));
-        if (e >= 0) e = pass_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
-        if (e < 0 || slow) return e;
-        last = rest;
-    }
-    return largest(r->world, r->solve_bar) <= PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
+    const crm_solve *c = &s->solve[0];
+    /* The rows in place are those at the end of stage 1, of what the sub-step did next. */
+    crm_copy(r->world, r->pose, s->q0);
+    crm_move(r->world, r->pose, c->v, s->h);
+    crm_turn_end(r->world, s, r->pose, &r->turn);
+    crm_pose_solve(r, s, c);
+    crm_turn_start(r->world, s, &r->turn);
+    carom_status e = close_vjp(r, s);
+    if (e < 0) return e;
+    memcpy(r->bars.u, r->total.u, r->n_sides * sizeof(double));
+    e = crm_rest_vjp(r);
+    if (e < 0) return e;
+    crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, v_bar, h_bar, with_parameters);
+    crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar, with_parameters);
+    if (with_parameters) crm_mass_vjp(r);
+    sides_vjp(r, s, q_bar, h_bar, with_parameters);
+    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar, with_parameters);
+    return CAROM_OK;
 }
 
 carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
@@ -323,20 +389,17 @@ static void contact_side_jvp(crm_forward *f, const crm_substep *s, int k, const 
 {
     const carom_world *w = f->world;
     const double h = s->h;
-    crm_contact c = s->contacts[k];
-    const int a = c.body_a;
-    const int b = c.body_b;
+    const crm_contact *c = &s->contacts[k];
+    const int a = c->body_a;
+    const int b = c->body_b;
     const double un = crm_row_dot(&f->dot.jn[6 * k], v, a, b);
     const double start = s->target[k] != 0 ? f->gap[k] + w->recovery * line->h : 0;
-    crm_contact_refresh(w, f->pose, &c);
-    const carom_contact_dot end = crm_geometry_jvp(w, f->pose, &c, f->pose_dot, line->by);
-    f->dot.cn[k] = (end.gap - start) / h - (c.gap - s->target[k]) * line->h / (h * h) - un;
+    const carom_contact_dot end = crm_geometry_jvp(w, f->pose, c, f->pose_dot, line->by);
+    f->dot.cn[k] = (end.gap - start) / h - un;
     f->dot.ct[k] = 0;
     if (!(w->rows.mu[k] > 0)) return;
     const double ut = crm_row_dot(&f->dot.jt[6 * k], v, a, b);
-    const double slip = crm_slip(w, &c, s->q0, f->pose);
-    f->dot.ct[k] = crm_slip_jvp(w, &c, s->q0, f->pose, line->q, f->pose_dot, line->by) / h -
-                   slip * line->h / (h * h) - ut;
+    f->dot.ct[k] = crm_slip_jvp(w, c, s->q0, f->pose, line->q, f->pose_dot, line->by) / h - ut;
 }
 
 /* Of c_e of one joint, whose first row in the island is `first`. */
@@ -347,11 +410,8 @@ static void joint_side_jvp(crm_forward *f, const crm_substep *s, int joint, int 
     const crm_joint *j = &w->joints[joint];
     const crm_measure *measures;
     const double h = s->h;
-    double je[6 * CRM_MAX_JOINT_ROWS];
-    double error[CRM_MAX_JOINT_ROWS];
     double row_dot[6];
     const int held = crm_joint_measures(j->kind, &measures);
-    crm_joint_rows(j, f->pose, je, error);
     for (int i = 0; i < held; i++) {
         const int row = first + i;
         const double target = s->joint_target[row];
@@ -359,8 +419,8 @@ static void joint_side_jvp(crm_forward *f, const crm_substep *s, int joint, int 
             target != 0 ? f->error[row] - copysign(w->recovery, target) * line->h : 0;
         const double end =
             crm_measure_jvp(w, joint, measures[i], f->pose, f->pose_dot, line->by, row_dot);
-        f->dot.ce[row] = (end - start) / h - (error[i] - target) * line->h / (h * h) -
-                         crm_row_dot(&f->dot.je[6 * row], v, j->body_a, j->body_b);
+        f->dot.ce[row] =
+            (end - start) / h - crm_row_dot(&f->dot.je[6 * row], v, j->body_a, j->body_b);
     }
 }
 
@@ -464,10 +524,12 @@ static carom_status stage_1_jvp(crm_forward *f, crm_substep *s, int n)
 {
     const crm_solve *c = &s->solve[0];
     carom_world *w = f->world;
-    crm_begin_solve(f, s, c);
     crm_copy(w, f->pose, s->q0);
     crm_move(w, f->pose, c->v, s->h);
-    crm_turn_of_rows(w, s, f->pose, &f->turn);
+    crm_rows_at(w, s, f->pose);
+    crm_turn_end(w, s, f->pose, &f->turn);
+    crm_begin_solve(f, s, c);
+    crm_turn_start(w, s, &f->turn);
     for (int i = 0; i < n; i++) {
         crm_line *line = &f->lines[i];
         crm_copy(w, line->v0, line->v);

@@ -159,6 +159,20 @@ CAROM_API carom_status carom_contact_adjoint(carom_contact_solver *solver,
                                              const carom_contact_solution *x, const double *v_bar,
                                              carom_contact_bars *bars);
 
+/* Another v_bar right after a carom_contact_adjoint, at the same problem and x, of which nothing
+ * has changed, to within tol of its largest entry (at least to 1e-15): only bars->u, cn, ct and ce
+ * are written.  No check, no factorization. */
+CAROM_API carom_status carom_contact_adjoint_again(carom_contact_solver *solver,
+                                                   const carom_contact_problem *problem,
+                                                   const double *v_bar, double tol,
+                                                   carom_contact_bars *bars);
+/* The other bars, of W, J and mu, from bars->u, cn, ct and ce, which are not NULL and may be sums
+ * of those of several v_bar: all are linear in it. */
+CAROM_API carom_status carom_contact_adjoint_rest(carom_contact_solver *solver,
+                                                  const carom_contact_problem *problem,
+                                                  const carom_contact_solution *x,
+                                                  carom_contact_bars *bars);
+
 /* Directions of the problem's data, shapes as in carom_contact_problem; NULL: zero. */
 typedef struct carom_contact_direction {
     const double *inv_mass;
@@ -178,6 +192,13 @@ CAROM_API carom_status carom_contact_tangent(carom_contact_solver *solver,
                                              const carom_contact_problem *problem,
                                              const carom_contact_solution *x,
                                              const carom_contact_direction *direction, double *dv);
+/* Another direction right after a carom_contact_tangent, at the same problem and x, of which
+ * nothing has changed.  No check, no factorization. */
+CAROM_API carom_status carom_contact_tangent_again(carom_contact_solver *solver,
+                                                   const carom_contact_problem *problem,
+                                                   const carom_contact_solution *x,
+                                                   const carom_contact_direction *direction,
+                                                   double *dv);
 
 #ifdef __cplusplus
 }
