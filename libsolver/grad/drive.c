@@ -65,8 +65,7 @@ static double by_times(double x, double t)
 
 /* One spring: force = -(k way + d speed) with k, d softened by h and weight. */
 static void spring_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, int joint,
-                       crm_measure m, double *v_bar, double *q_bar, double *h_bar,
-                       int with_parameters)
+                       crm_measure m, double *v_bar, double *q_bar, double *h_bar)
 {
     const crm_joint *j = &r->world->joints[joint];
     const double lever = m == CRM_TURN ? j->lever : 1;
@@ -85,7 +84,6 @@ static void spring_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c,
     weight_vjp(r, j, p.row, kt_bar * 0.5 * dt * dt + wt_bar * dt, row_bar);
     speed_vjp(r, s, c, j, p.row, -p.d * f_bar, v_bar, row_bar);
     crm_measure_vjp(j, m, c->q, row_bar, -p.k * f_bar, q_bar, &bar);
-    if (!with_parameters) return;
     add_to(r->sink.g.dt, 0, kt_bar * dt * p.weight + wt_bar * p.weight);
     add_to(r->sink.g.stiffness, joint, k_bar * crm_soften_slope(p.stiffness, kt) / (lever * lever));
     add_to(r->sink.g.damping, joint,
@@ -96,7 +94,7 @@ static void spring_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c,
 
 /* A motor at its limit gives a known impulse; one that holds has a row and c_e = - speed. */
 static void motor_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, int joint, int row,
-                      double *q_bar, double *h_bar, int with_parameters)
+                      double *q_bar, double *h_bar)
 {
     const crm_joint *j = &r->world->joints[joint];
     const crm_measure m = crm_motor_measure(j->kind);
@@ -106,20 +104,20 @@ static void motor_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, 
     double row_bar[6] = {0};
     if (c->motor[row] == CRM_MOTOR_HOLDS) {
         memcpy(row_bar, &r->bars.je[6 * row], sizeof row_bar);
-        if (with_parameters) add_to(r->sink.g.motor_speed, joint, -lever * r->bars.ce[row]);
+        add_to(r->sink.g.motor_speed, joint, -lever * r->bars.ce[row]);
     } else {
         const double b = crm_motor_impulse(s, c, j, row);
         crm_measure_at(j, m, c->q, je);
         const double b_bar = push_vjp(r, j, je, b, row_bar);
         *h_bar += b_bar * b / s->h;
-        if (with_parameters) add_to(r->sink.g.motor_limit, joint, b_bar * b / j->motor_limit);
+        add_to(r->sink.g.motor_limit, joint, b_bar * b / j->motor_limit);
     }
     crm_measure_vjp(j, m, c->q, row_bar, 0, q_bar, &bar);
-    if (with_parameters) crm_joint_give(r, joint, &bar);
+    crm_joint_give(r, joint, &bar);
 }
 
 void crm_drive_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *v_bar,
-                   double *q_bar, double *h_bar, int with_parameters)
+                   double *q_bar, double *h_bar)
 {
     const carom_world *w = r->world;
     int first = 0;
@@ -130,10 +128,10 @@ void crm_drive_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, dou
         const int springs = j->stiffness > 0 || j->damping > 0;
         const int n = springs ? crm_spring_measures(j->kind, measures) : 0;
         for (int i = 0; i < n; i++) {
-            spring_vjp(r, s, c, joint, measures[i], v_bar, q_bar, h_bar, with_parameters);
+            spring_vjp(r, s, c, joint, measures[i], v_bar, q_bar, h_bar);
         }
         if (j->n_rows > j->n_held) {
-            motor_vjp(r, s, c, joint, first + j->n_held, q_bar, h_bar, with_parameters);
+            motor_vjp(r, s, c, joint, first + j->n_held, q_bar, h_bar);
         }
         first += j->n_rows;
     }
@@ -141,7 +139,7 @@ void crm_drive_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, dou
 
 /* c_e = (measure(p) - measure(q0)) / h - speed - J v; the speed and J are in motor_vjp. */
 void crm_motor_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int row, double *q0_bar,
-                        double *h_bar, int with_parameters)
+                        double *h_bar)
 {
     const crm_joint *j = &r->world->joints[joint];
     const crm_measure m = crm_motor_measure(j->kind);
@@ -159,7 +157,7 @@ void crm_motor_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int row
     *h_bar -= ce_bar * way / (s->h * s->h);
     crm_measure_vjp(j, m, r->pose, NULL, ce_bar / s->h, r->pose_bar, &bar);
     crm_measure_vjp(j, m, s->q0, row_bar, -ce_bar / s->h, q0_bar, &bar);
-    if (with_parameters) crm_joint_give(r, joint, &bar);
+    crm_joint_give(r, joint, &bar);
 }
 
 /* --- forward: the transposes of the above ------------------------------------------------------

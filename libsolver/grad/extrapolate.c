@@ -3,41 +3,40 @@
 
 /* q' = q + d(q), with the slips from q0 among the right-hand sides. */
 static carom_status hold_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, double *q_bar,
-                             double *q0_bar, int with_parameters)
+                             double *q0_bar)
 {
     const carom_status e = crm_solve_vjp(r, s, c, q_bar);
     if (e < 0) return e;
-    if (with_parameters) crm_mass_vjp(r);
+    crm_mass_vjp(r);
     for (int k = 0; k < s->n_contacts; k++) {
         if (!(r->world->rows.mu[k] > 0)) continue; /* crm_hold_problem has chosen */
-        crm_slip_vjp(r, &s->moved[k], s->q0, c->q, r->bars.ct[k], q0_bar, q_bar, with_parameters);
+        crm_slip_vjp(r, &s->moved[k], s->q0, c->q, r->bars.ct[k], q0_bar, q_bar);
     }
-    crm_rows_vjp(r, s, c, r->bars.cn, r->bars.ce, q_bar, with_parameters);
+    crm_rows_vjp(r, s, c, r->bars.cn, r->bars.ce, q_bar);
     return CAROM_OK;
 }
 
 static carom_status hold_speed_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c,
-                                   double *q_bar, double *v_bar, int with_parameters)
+                                   double *q_bar, double *v_bar)
 {
     const crm_island *island = r->world->island;
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
-    if (with_parameters) crm_mass_vjp(r);
+    crm_mass_vjp(r);
     for (int i = 0; i < island->n_bodies; i++) {
         memcpy(&v_bar[3 * island->bodies[i]], &r->bars.u[3 * i], 3 * sizeof *v_bar);
     }
-    crm_rows_vjp(r, s, c, NULL, NULL, q_bar, with_parameters);
+    crm_rows_vjp(r, s, c, NULL, NULL, q_bar);
     return CAROM_OK;
 }
 
 static carom_status holds_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                              double *q0_bar, int with_parameters)
+                              double *q0_bar)
 {
     for (int k = s->n_solves - 1; k > 1; k--) {
         const crm_solve *c = &s->solve[k];
-        const carom_status e = c->kind == CRM_HOLD
-                                   ? hold_vjp(r, s, c, q_bar, q0_bar, with_parameters)
-                                   : hold_speed_vjp(r, s, c, q_bar, v_bar, with_parameters);
+        const carom_status e = c->kind == CRM_HOLD ? hold_vjp(r, s, c, q_bar, q0_bar)
+                                                   : hold_speed_vjp(r, s, c, q_bar, v_bar);
         if (e < 0) return e;
     }
     return CAROM_OK;
@@ -53,13 +52,12 @@ static void add(const carom_world *w, double *to, const double *from, double sca
 
 /* Column n, whose last inner record is `last`, from (column_q, column_v) at its end to its start.
  */
-static carom_status column_vjp(crm_reverse *r, int n, int last, int with_parameters, double *h_bar)
+static carom_status column_vjp(crm_reverse *r, int n, int last, double *h_bar)
 {
     for (int k = last; k > last - n; k--) {
         double inner_bar;
         crm_unpack(r->world, &r->tape->records[k], r->moved, &r->inner);
-        const carom_status e =
-            crm_smooth_vjp(r, &r->inner.s, r->column_q, r->column_v, with_parameters, &inner_bar);
+        const carom_status e = crm_smooth_vjp(r, &r->inner.s, r->column_q, r->column_v, &inner_bar);
         if (e < 0) return e;
         *h_bar += inner_bar / n;
     }
@@ -68,7 +66,7 @@ static carom_status column_vjp(crm_reverse *r, int n, int last, int with_paramet
 
 /* Static bodies feel all columns alike: what they have is kept apart from what the columns give. */
 carom_status crm_extrapolated_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                                  int with_parameters, double *h_bar)
+                                  double *h_bar)
 {
     const carom_world *w = r->world;
     const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
@@ -76,14 +74,14 @@ carom_status crm_extrapolated_vjp(crm_reverse *r, crm_substep *s, double *q_bar,
     memset(r->start_q, 0, bytes);
     memset(r->start_v, 0, bytes);
     *h_bar = 0;
-    carom_status e = holds_vjp(r, s, q_bar, v_bar, r->start_q, with_parameters);
+    carom_status e = holds_vjp(r, s, q_bar, v_bar, r->start_q);
     for (int n = 1; e >= 0 && n * (n - 1) / 2 < s->n_inner; n++) {
         if (s->weight[n - 1] == 0) continue;
         memset(r->column_q, 0, bytes);
         memset(r->column_v, 0, bytes);
         add(w, r->column_q, q_bar, s->weight[n - 1]);
         add(w, r->column_v, v_bar, s->weight[n - 1]);
-        e = column_vjp(r, n, first + n * (n + 1) / 2 - 1, with_parameters, h_bar);
+        e = column_vjp(r, n, first + n * (n + 1) / 2 - 1, h_bar);
         for (int k = 0; k < 3 * w->n_bodies; k++) {
             r->start_q[k] += r->column_q[k];
             r->start_v[k] += r->column_v[k];

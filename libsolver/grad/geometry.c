@@ -39,23 +39,23 @@ static void add_pose(double *q_bar, int body, carom_pose p)
 }
 
 void crm_geometry_vjp(crm_reverse *r, const double *q, const crm_contact *c,
-                      const carom_contact_bar *bar, double *q_bar, int with_parameters)
+                      const carom_contact_bar *bar, double *q_bar)
 {
     const carom_world *w = r->world;
     if (c->limit) {
-        crm_limit_vjp(r, q, c->limit, bar, q_bar, with_parameters);
+        crm_limit_vjp(r, q, c->limit, bar, q_bar);
         return;
     }
     const crm_shape *a = &w->shapes[c->shape_a];
     const crm_shape *b = &w->shapes[c->shape_b];
-    carom_vec2 *vertices = with_parameters ? r->sink.g.vertices : NULL;
+    carom_vec2 *vertices = r->sink.g.vertices;
     carom_shape_bar a_bar = {{0, 0, 0}, 0, vertices ? vertices + a->first_vertex : NULL};
     carom_shape_bar b_bar = {{0, 0, 0}, 0, vertices ? vertices + b->first_vertex : NULL};
     carom_contact_vjp(&a->view, crm_pose(q, c->body_a), &b->view, crm_pose(q, c->body_b), c->recipe,
                       bar, &a_bar, &b_bar);
     add_pose(q_bar, c->body_a, a_bar.pose);
     add_pose(q_bar, c->body_b, b_bar.pose);
-    if (with_parameters && r->sink.g.radius) {
+    if (r->sink.g.radius) {
         r->sink.g.radius[c->shape_a] += a_bar.radius;
         r->sink.g.radius[c->shape_b] += b_bar.radius;
     }
@@ -89,7 +89,7 @@ static void slide_point_vjp(const crm_slide *s, const double *q, carom_vec2 y_ba
 
 /* slip = t . (y1 - y0) - r (turn of i - turn of k), t = (b - a) / |b - a|. */
 static void slide_vjp(crm_reverse *r, const crm_contact *c, const double *q0, const double *q1,
-                      double bar, double *q0_bar, double *q1_bar, int with_parameters)
+                      double bar, double *q0_bar, double *q1_bar)
 {
     const crm_slide s = crm_slide_of(r->world, c);
     const carom_vec2 up = {bar * s.t.x, bar * s.t.y};
@@ -101,7 +101,6 @@ static void slide_vjp(crm_reverse *r, const crm_contact *c, const double *q0, co
     q0_bar[3 * s.point_body] += bar * s.radius;
     q1_bar[3 * s.face_body] += bar * s.radius;
     q0_bar[3 * s.face_body] -= bar * s.radius;
-    if (!with_parameters) return;
     const carom_vec2 y0 = crm_slide_point(&s, q0);
     const carom_vec2 y1 = crm_slide_point(&s, q1);
     const carom_vec2 d = {y1.x - y0.x, y1.y - y0.y};
@@ -122,7 +121,7 @@ static void slide_vjp(crm_reverse *r, const crm_contact *c, const double *q0, co
 
 /* d angle(n) = cross(u, du) / |u|^2 for u from the center of A to that of B. */
 static void angle_vjp(crm_reverse *r, const crm_contact *c, const double *q, double bar,
-                      double *q_bar, int with_parameters)
+                      double *q_bar)
 {
     const carom_world *w = r->world;
     const carom_vec2 va = w->shapes[c->shape_a].view.vertices[c->recipe.ref];
@@ -139,25 +138,24 @@ static void angle_vjp(crm_reverse *r, const crm_contact *c, const double *q, dou
     q_bar[3 * c->body_b + 2] += b_bar.y;
     crm_arm_vjp(q[3 * c->body_a], va, a_bar, &q_bar[3 * c->body_a], &va_bar);
     crm_arm_vjp(q[3 * c->body_b], vb, b_bar, &q_bar[3 * c->body_b], &vb_bar);
-    if (!with_parameters) return;
     add_vertex(r, c->shape_a, c->recipe.ref, va_bar.x, va_bar.y);
     add_vertex(r, c->shape_b, c->recipe.inc, vb_bar.x, vb_bar.y);
 }
 
 /* slip = (ra + rb) angle(n0 -> n1) - ra turn of A - rb turn of B. */
 static void roll_vjp(crm_reverse *r, const crm_contact *c, const double *q0, const double *q1,
-                     double bar, double *q0_bar, double *q1_bar, int with_parameters)
+                     double bar, double *q0_bar, double *q1_bar)
 {
     const carom_world *w = r->world;
     const double ra = w->shapes[c->shape_a].view.radius;
     const double rb = w->shapes[c->shape_b].view.radius;
-    angle_vjp(r, c, q1, bar * (ra + rb), q1_bar, with_parameters);
-    angle_vjp(r, c, q0, -bar * (ra + rb), q0_bar, with_parameters);
+    angle_vjp(r, c, q1, bar * (ra + rb), q1_bar);
+    angle_vjp(r, c, q0, -bar * (ra + rb), q0_bar);
     q1_bar[3 * c->body_a] -= bar * ra;
     q0_bar[3 * c->body_a] += bar * ra;
     q1_bar[3 * c->body_b] -= bar * rb;
     q0_bar[3 * c->body_b] += bar * rb;
-    if (!with_parameters || !r->sink.g.radius) return;
+    if (!r->sink.g.radius) return;
     const carom_vec2 u0 = crm_centers(w, c, q0);
     const carom_vec2 u1 = crm_centers(w, c, q1);
     const double angle = atan2(u0.x * u1.y - u0.y * u1.x, u0.x * u1.x + u0.y * u1.y);
@@ -166,12 +164,12 @@ static void roll_vjp(crm_reverse *r, const crm_contact *c, const double *q0, con
 }
 
 void crm_slip_vjp(crm_reverse *r, const crm_contact *c, const double *q0, const double *q1,
-                  double slip_bar, double *q0_bar, double *q1_bar, int with_parameters)
+                  double slip_bar, double *q0_bar, double *q1_bar)
 {
     if (c->recipe.kernel == CAROM_POINT_POINT) {
-        roll_vjp(r, c, q0, q1, slip_bar, q0_bar, q1_bar, with_parameters);
+        roll_vjp(r, c, q0, q1, slip_bar, q0_bar, q1_bar);
     } else {
-        slide_vjp(r, c, q0, q1, slip_bar, q0_bar, q1_bar, with_parameters);
+        slide_vjp(r, c, q0, q1, slip_bar, q0_bar, q1_bar);
     }
 }
 

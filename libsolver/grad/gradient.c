@@ -22,10 +22,9 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
     const size_t k3 = 3 * (size_t)r->world->n_moving;
     const size_t rows = (size_t)r->world->n_joint_rows;
-    double **const full[] = {&r->q_bar,   &r->v_bar,    &r->q_seed,   &r->v_seed,   &r->solve_bar,
-                             &r->pose,    &r->pose_bar, &r->rest,     &r->spare_q,  &r->spare_v,
-                             &r->q_after, &r->v_after,  &r->column_q, &r->column_v, &r->start_q,
-                             &r->start_v, &r->late_bar};
+    double **const full[] = {&r->q_bar,    &r->v_bar,    &r->solve_bar, &r->pose,    &r->pose_bar,
+                             &r->rest,     &r->spare_q,  &r->spare_v,   &r->q_after, &r->v_after,
+                             &r->column_q, &r->column_v, &r->start_q,   &r->start_v, &r->late_bar};
     for (size_t k = 0; k < sizeof full / sizeof *full; k++) {
         *full[k] = crm_carve(b, n3, sizeof(double));
     }
@@ -89,9 +88,8 @@ static void drop_negligible(const carom_world *w, double *x, double scale)
 }
 
 /* The indicator g whose root ended the sub-step: the gap of its contact, or Jt v1.  Adds the
- * cotangents of scale g at (q1, v1); parameters go to the sink when with_parameters. */
-static void event_vjp(crm_reverse *r, const crm_substep *s, double scale, double *q_bar,
-                      double *v_bar, int with_parameters)
+ * cotangents of scale g at (q1, v1) and of the parameters. */
+static void event_vjp(crm_reverse *r, const crm_substep *s, double scale)
 {
     static const double none[6] = {0};
     const crm_contact *c = &s->event;
@@ -104,36 +102,46 @@ static void event_vjp(crm_reverse *r, const crm_substep *s, double scale, double
         crm_contact_rows(c, jn, jt);
         for (int i = 0; i < 6; i++) {
             const int x = 3 * (i < 3 ? c->body_a : c->body_b) + i % 3;
-            v_bar[x] += scale * jt[i];
+            r->v_bar[x] += scale * jt[i];
             jt_bar[i] = scale * s->v1[x];
         }
         crm_contact_rows_vjp(c, none, jt_bar, &bar);
     }
-    crm_geometry_vjp(r, s->q1, c, &bar, q_bar, with_parameters);
+    crm_geometry_vjp(r, s->q1, c, &bar, r->q_bar);
+}
+
+static double dot_island(const carom_world *w, const double *x, const double *y)
+{
+    double sum = 0;
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int b = 3 * w->island->bodies[i];
+        sum += x[b] * y[b] + x[b + 1] * y[b + 1] + x[b + 2] * y[b + 2];
+    }
+    return sum;
 }
 
 /* The sub-step ended at the root h* of g: dh* = -(dg/dtheta) / (dg/dh).  With H = h_bar - left_bar,
  * the cotangent of h*, every derivative of g enters with k = -H / (dg/dh): the seeds k dg/dq1 and
- * k dg/dv1 are added to q_bar and v_bar, and k dg/dparameter to the sink. */
+ * k dg/dv1 are added to q_bar and v_bar, and k dg/dparameter to the sink.  What h does to (q1, v1)
+ * is found forward: it gives h_bar and dg/dh. */
 static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar)
 {
     const carom_world *w = r->world;
-    double h_bar;
-    double slope;
-    crm_copy(w, r->q_seed, r->q_bar);
-    crm_copy(w, r->v_seed, r->v_bar);
-    carom_status e = crm_substep_vjp(r, s, r->q_seed, r->v_seed, 0, &h_bar);
+    crm_forward *f = &r->clockwork;
+    carom_status e = CAROM_OK;
+    if (!f->block) e = crm_forward_open(f, r->tape, 0, NULL, r->to);
     if (e < 0) return e;
-    crm_zero(w, r->q_seed);
-    crm_zero(w, r->v_seed);
-    event_vjp(r, s, 1, r->q_seed, r->v_seed, 0);
-    e = crm_substep_vjp(r, s, r->q_seed, r->v_seed, 0, &slope);
+    f->record = r->record;
+    const crm_line *clock = crm_begin_clockwork(f);
+    e = crm_substep_jvp(f, s, 1);
     if (e < 0) return e;
+    const double slope = crm_event_jvp(f, s, clock);
+    const double h_bar = dot_island(w, r->q_bar, clock->q) + dot_island(w, r->v_bar, clock->v);
     if (fabs(slope) <= crm_grazing(w, s)) {
         r->stats.degenerate++;
         return CAROM_OK;
     }
-    event_vjp(r, s, -(h_bar - left_bar) / slope, r->q_bar, r->v_bar, 1);
+    event_vjp(r, s, -(h_bar - left_bar) / slope);
     return CAROM_OK;
 }
 
@@ -150,7 +158,7 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
         const carom_status e = locate_vjp(r, s, *left_bar);
         if (e < 0) return e;
     }
-    const carom_status e = crm_substep_vjp(r, s, r->q_bar, r->v_bar, 1, &h_bar);
+    const carom_status e = crm_substep_vjp(r, s, r->q_bar, r->v_bar, &h_bar);
     if (e < 0) return e;
     drop_negligible(r->world, r->q_bar, r->scale);
     drop_negligible(r->world, r->v_bar, r->scale);
@@ -290,7 +298,9 @@ carom_status crm_gradient_span(carom_tape *t, int from, int to, int n_bars,
     r.wants_joints = gradient->anchors || gradient->axes || gradient->angles || gradient->lengths;
     carom_status e = allocate(&r);
     if (!e) e = reverse_span(&r, n_bars, bars);
+    r.stats.solves += r.clockwork.stats.solves;
     crm_free(&t->memory, r.block, r.bytes, 1);
+    if (r.clockwork.block) crm_forward_close(&r.clockwork);
     if (e < 0) return crm_world_fail(t->world, e, "gradient: %s", carom_status_text(e));
     if (stats) *stats = r.stats;
     return CAROM_OK;

@@ -92,19 +92,70 @@ typedef struct crm_turn {
     double *n, *t; /* per contact; 0 where there is no friction */
     double *e;     /* per joint row */
 } crm_turn;
+/* Passes of stage 1 end when the rest is below CRM_PASS_TOL [of the first].  Where one leaves more
+ * than CRM_SLOW of the rest, the sum is found by Anderson's method.  A rest above CRM_PASS_LOOSE
+ * after all of them: no derivative rather than a wrong one. */
+#define CRM_PASS_TOL   1e-15
+#define CRM_SLOW       0.3
+#define CRM_PASS_LOOSE 1e-9
+enum { CRM_MAX_PASSES = 60 };
+/* smooth.c: the largest number of the island. */
+double crm_largest(const carom_world *w, const double *x);
 /* smooth.c: first with the rows at the end p of stage 1 in place, then with those at its start. */
 void crm_turn_end(const carom_world *w, const crm_substep *s, const double *p, crm_turn *turn);
 void crm_turn_start(const carom_world *w, const crm_substep *s, crm_turn *turn);
+
+/* One direction on its way: changes of the state and of what else moves. */
+typedef struct crm_line {
+    const carom_gradient *by;  /* parameters, read only */
+    double h;                  /* of the length of the sub-step */
+    double left;               /* of the time left to the island */
+    double *q, *v;             /* 3 n_bodies, like all below: of the state under way */
+    double *q0, *v0;           /* ... and of the start of the sub-step */
+    double *start_q, *start_v; /* of an extrapolated one, whose columns use the others */
+    double *sum_q, *sum_v;     /* of its columns, weighted */
+    double *clock, *clock_old; /* per body: of the time owed to the next step and to this one */
+} crm_line;
+
+/* Changes of the data of a contact problem: a carom_contact_direction that can be written. */
+typedef struct crm_problem_dot {
+    double *inv_mass, *u, *jn, *jt, *mu, *cn, *ct, *je, *ce;
+} crm_problem_dot;
+
+/* Workspace of a forward pass.  Lines share the factors of every problem. */
+typedef struct crm_forward {
+    carom_tape *tape;
+    carom_world *world;
+    int n;           /* lines */
+    crm_line *lines; /* n, and one that moves by h alone */
+    int from;        /* the frame that the pass begins with */
+    int frame;       /* under way */
+    int record;      /* under way */
+    crm_problem_dot dot;
+    crm_turn turn;
+    double *gap;             /* per contact: change of its gap at the pose of the rows */
+    double *error;           /* per joint row */
+    double *result;          /* 3 per body of the island: of the velocity of a solve */
+    double *pose, *pose_dot; /* 3 n_bodies: end of an iteration of stage 1 */
+    double *rest, *trial;    /* 3 n_bodies: what the passes of stage 1 give; 0 of static bodies */
+    carom_contact_problem problem;   /* of the solve under way */
+    carom_contact_solution solution; /* likewise */
+    crm_contact *moved;
+    crm_unpacked work, inner;
+    void *block;
+    size_t bytes;
+    carom_gradient_stats stats;
+} crm_forward;
 
 /* Workspace of a reverse pass. */
 typedef struct crm_reverse {
     carom_tape *tape;
     carom_world *world;
     crm_sink sink;
-    int from, to;          /* frames from .. to - 1 */
-    double scale;          /* largest seed so far */
-    double *q_bar, *v_bar; /* 3 n_bodies: state under way */
-    double *q_seed, *v_seed;
+    int from, to;                    /* frames from .. to - 1 */
+    double scale;                    /* largest seed so far */
+    crm_forward clockwork;           /* without lines of its own; opened by the first event */
+    double *q_bar, *v_bar;           /* 3 n_bodies: state under way */
     double *velocity_bar;            /* 3 per body of the island */
     double *gap_bar;                 /* per contact */
     carom_contact_bars bars;         /* of the solve under way, in one block, so that they add up */
@@ -165,9 +216,9 @@ carom_status crm_gradient_span(carom_tape *t, int from, int to, int n_bars,
 void crm_contact_rows_vjp(const crm_contact *c, const double jn_bar[6], const double jt_bar[6],
                           carom_contact_bar *bar);
 void crm_geometry_vjp(crm_reverse *r, const double *q, const crm_contact *c,
-                      const carom_contact_bar *bar, double *q_bar, int with_parameters);
+                      const carom_contact_bar *bar, double *q_bar);
 void crm_slip_vjp(crm_reverse *r, const crm_contact *c, const double *q0, const double *q1,
-                  double slip_bar, double *q0_bar, double *q1_bar, int with_parameters);
+                  double slip_bar, double *q0_bar, double *q1_bar);
 
 /* joint.c: each adds. */
 /* Of x = p + R(angle) local: the arm's cotangent to angle and local (may be NULL). */
@@ -179,23 +230,23 @@ typedef struct crm_joint_bar {
 } crm_joint_bar;
 /* Of a limit as a contact: bar as in carom_contact_vjp. */
 void crm_limit_vjp(crm_reverse *r, const double *q, int limit, const carom_contact_bar *bar,
-                   double *q_bar, int with_parameters);
+                   double *q_bar);
 /* Of a measure and its row (may be NULL) at q. */
 void crm_measure_vjp(const crm_joint *j, crm_measure m, const double *q, const double row_bar[6],
                      double value_bar, double *q_bar, crm_joint_bar *bar);
 /* Of a joint's rows (6 numbers each) and errors, each may be NULL. */
 void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double *je_bar,
-                   const double *error_bar, double *q_bar, int with_parameters);
+                   const double *error_bar, double *q_bar);
 
 void crm_joint_give(const crm_reverse *r, int joint, const crm_joint_bar *bar);
 
 /* drive.c: springs and motors in rows.u and rows of a solve: after crm_solve_vjp, before
  * crm_mass_vjp.  v_bar: of the velocity before the solve (of stage 2: of vh, and r->late_bar). */
 void crm_drive_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *v_bar,
-                   double *q_bar, double *h_bar, int with_parameters);
+                   double *q_bar, double *h_bar);
 /* The row of a motor that holds, in an iteration of stage 1 that ends at r->pose. */
 void crm_motor_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int row, double *q0_bar,
-                        double *h_bar, int with_parameters);
+                        double *h_bar);
 
 /* reverse.c: the adjoint of one solve. */
 /* Problem and solution of solve c of s; rows in place. */
@@ -210,7 +261,7 @@ carom_status crm_solve_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, c
 /* u = v + h (W f + g): u_bar to v_bar, h_bar (times share = dh / dstep), forces, gravity, masses.
  */
 void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, double h, double share,
-                           double *v_bar, double *h_bar, int with_parameters);
+                           double *v_bar, double *h_bar);
 /* q1 = q0 + h v: v_bar += h q_bar, *h_bar += q_bar . v. */
 void crm_move_vjp(const carom_world *w, const crm_substep *s, const double *v, const double *q_bar,
                   double *v_bar, double *h_bar);
@@ -219,74 +270,30 @@ void crm_mass_vjp(crm_reverse *r);
 /* Rows in r->bars, and gaps and joint errors when given, at q of solve c, to q_bar and parameters.
  */
 void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, const double *gap_bar,
-                  const double *error_bar, double *q_bar, int with_parameters);
+                  const double *error_bar, double *q_bar);
 /* c_n = e u_n with u_n = J_n v, or gap / h ahead: adds to v_bar, rows, gap_bar, h_bar. */
 void crm_targets_vjp(crm_reverse *r, const crm_substep *s, const double *v, double *v_bar,
-                     double *gap_bar, double *h_bar, int with_parameters);
+                     double *gap_bar, double *h_bar);
 
 /* q' = q + d(q): the frictionless problem of a position correction. */
-carom_status crm_correction_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, double *q_bar,
-                                int with_parameters);
+carom_status crm_correction_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, double *q_bar);
 /* Restitution of a contact: e_bar to both bodies. */
 void crm_restitution_vjp(crm_reverse *r, const crm_substep *s, const crm_contact *c, double e_bar);
 
 /* The maps, from (q_bar, v_bar) at the end of a sub-step to its start, in place; parameters go to
- * the sink when with_parameters; *h_bar is the cotangent of h. */
+ * the sink; *h_bar is the cotangent of h. */
 carom_status crm_euler_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                           int with_parameters, double *h_bar);
+                           double *h_bar);
 carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                            int with_parameters, double *h_bar);
+                            double *h_bar);
 carom_status crm_extrapolated_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                                  int with_parameters, double *h_bar);
-carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                            int with_parameters);
+                                  double *h_bar);
+carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar);
 carom_status crm_substep_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                             int with_parameters, double *h_bar);
+                             double *h_bar);
 
 /* --- forward ------------------------------------------------------------------------------------
  */
-
-/* One direction on its way: changes of the state and of what else moves. */
-typedef struct crm_line {
-    const carom_gradient *by;  /* parameters, read only */
-    double h;                  /* of the length of the sub-step */
-    double left;               /* of the time left to the island */
-    double *q, *v;             /* 3 n_bodies, like all below: of the state under way */
-    double *q0, *v0;           /* ... and of the start of the sub-step */
-    double *start_q, *start_v; /* of an extrapolated one, whose columns use the others */
-    double *sum_q, *sum_v;     /* of its columns, weighted */
-    double *clock, *clock_old; /* per body: of the time owed to the next step and to this one */
-} crm_line;
-
-/* Changes of the data of a contact problem: a carom_contact_direction that can be written. */
-typedef struct crm_problem_dot {
-    double *inv_mass, *u, *jn, *jt, *mu, *cn, *ct, *je, *ce;
-} crm_problem_dot;
-
-/* Workspace of a forward pass.  Lines share the factors of every problem. */
-typedef struct crm_forward {
-    carom_tape *tape;
-    carom_world *world;
-    int n;           /* lines */
-    crm_line *lines; /* n, and one that moves by h alone */
-    int from;        /* the frame that the pass begins with */
-    int frame;       /* under way */
-    int record;      /* under way */
-    crm_problem_dot dot;
-    crm_turn turn;
-    double *gap;             /* per contact: change of its gap at the pose of the rows */
-    double *error;           /* per joint row */
-    double *result;          /* 3 per body of the island: of the velocity of a solve */
-    double *pose, *pose_dot; /* 3 n_bodies: end of an iteration of stage 1 */
-    double *rest, *trial;    /* 3 n_bodies: what the passes of stage 1 give; 0 of static bodies */
-    carom_contact_problem problem;   /* of the solve under way */
-    carom_contact_solution solution; /* likewise */
-    crm_contact *moved;
-    crm_unpacked work, inner;
-    void *block;
-    size_t bytes;
-    carom_gradient_stats stats;
-} crm_forward;
 
 static inline double crm_entry(const double *array, int i)
 {
@@ -354,5 +361,9 @@ carom_status crm_forward_frame(crm_forward *f, int frame);
  * which moves it along (v, W f + g). */
 void crm_give_state(const crm_forward *f, const crm_line *line, const carom_state_dot *to);
 void crm_forward_close(crm_forward *f);
+/* The line behind the others, at rest but for h. */
+crm_line *crm_begin_clockwork(const crm_forward *f);
+/* Change of the indicator that ended the sub-step, at the changed (q1, v1) of the line. */
+double crm_event_jvp(const crm_forward *f, const crm_substep *s, const crm_line *line);
 
 #endif

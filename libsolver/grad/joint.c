@@ -125,7 +125,7 @@ void crm_joint_give(const crm_reverse *r, int joint, const crm_joint_bar *bar)
 }
 
 void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double *je_bar,
-                   const double *error_bar, double *q_bar, int with_parameters)
+                   const double *error_bar, double *q_bar)
 {
     const crm_joint *j = &r->world->joints[joint];
     const crm_measure *measures;
@@ -135,12 +135,12 @@ void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double *je_
         crm_measure_vjp(j, measures[k], q, je_bar ? &je_bar[6 * k] : NULL,
                         error_bar ? error_bar[k] : 0, q_bar, &bar);
     }
-    if (with_parameters) crm_joint_give(r, joint, &bar);
+    crm_joint_give(r, joint, &bar);
 }
 
 /* gap = sign (measure - bound), normal = sign u. */
 void crm_limit_vjp(crm_reverse *r, const double *q, int limit, const carom_contact_bar *bar,
-                   double *q_bar, int with_parameters)
+                   double *q_bar)
 {
     const int joint = crm_limit_joint(limit);
     const crm_joint *j = &r->world->joints[joint];
@@ -156,7 +156,6 @@ void crm_limit_vjp(crm_reverse *r, const double *q, int limit, const carom_conta
         add(&x.u, bar->normal, sign);
         made_vjp(j, m, q, &f, &x, value_bar, q_bar, &to);
     }
-    if (!with_parameters) return;
     double *bound = sign > 0 ? r->sink.g.lower : r->sink.g.upper;
     if (bound) bound[joint] -= value_bar * (m == CRM_TURN ? j->lever : 1);
     crm_joint_give(r, joint, &to);

@@ -61,7 +61,7 @@ void crm_mass_vjp(crm_reverse *r)
 }
 
 void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, double h, double share,
-                           double *v_bar, double *h_bar, int with_parameters)
+                           double *v_bar, double *h_bar)
 {
     const carom_world *w = r->world;
     const carom_gradient *g = &r->sink.g;
@@ -74,7 +74,6 @@ void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, double h, doubl
             const double gravity = falls ? w->settings.gravity[k - 1] : 0;
             v_bar[3 * b + k] += u_bar;
             *h_bar += share * u_bar * (W * s->force[3 * b + k] + gravity);
-            if (!with_parameters) continue;
             r->bars.inv_mass[3 * i + k] += h * u_bar * s->force[3 * b + k];
             if (g->force) g->force[3 * b + k] += h * W * u_bar;
             if (r->sink.force_step) r->sink.force_step[3 * b + k] += h * W * u_bar;
@@ -96,7 +95,7 @@ void crm_restitution_vjp(crm_reverse *r, const crm_substep *s, const crm_contact
 }
 
 void crm_targets_vjp(crm_reverse *r, const crm_substep *s, const double *v, double *v_bar,
-                     double *gap_bar, double *h_bar, int with_parameters)
+                     double *gap_bar, double *h_bar)
 {
     const carom_world *w = r->world;
     for (int k = 0; k < s->n_contacts; k++) {
@@ -118,7 +117,7 @@ void crm_targets_vjp(crm_reverse *r, const crm_substep *s, const double *v, doub
             r->bars.jn[6 * k + i] += e * cn_bar * v[3 * c->body_a + i];
             r->bars.jn[6 * k + 3 + i] += e * cn_bar * v[3 * c->body_b + i];
         }
-        if (with_parameters) crm_restitution_vjp(r, s, c, cn_bar * un);
+        crm_restitution_vjp(r, s, c, cn_bar * un);
     }
 }
 
@@ -164,27 +163,26 @@ static void friction_vjp(crm_reverse *r, const crm_solve *c, int k, const crm_co
 }
 
 void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, const double *gap_bar,
-                  const double *error_bar, double *q_bar, int with_parameters)
+                  const double *error_bar, double *q_bar)
 {
     const int rough = c->kind != CRM_CORRECTION && !s->slick;
     for (int k = 0; k < s->n_contacts; k++) {
         carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, gap_bar ? gap_bar[k] : 0};
         const double *jt_bar = rough ? &r->bars.jt[6 * k] : NULL;
         crm_contact_rows_vjp(&s->moved[k], &r->bars.jn[6 * k], jt_bar, &bar);
-        crm_geometry_vjp(r, c->q, &s->moved[k], &bar, q_bar, with_parameters);
-        if (with_parameters && rough) friction_vjp(r, c, k, &s->moved[k]);
+        crm_geometry_vjp(r, c->q, &s->moved[k], &bar, q_bar);
+        if (rough) friction_vjp(r, c, k, &s->moved[k]);
     }
     int row = 0;
     for (int k = 0; k < r->world->island->n_joints; k++) {
         const int joint = r->world->island->joints[k];
         crm_joint_vjp(r, c->q, joint, &r->bars.je[6 * row], error_bar ? &error_bar[row] : NULL,
-                      q_bar, with_parameters);
+                      q_bar);
         row += r->world->joints[joint].n_rows;
     }
 }
 
-carom_status crm_correction_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, double *q_bar,
-                                int with_parameters)
+carom_status crm_correction_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, double *q_bar)
 {
     const crm_island *island = r->world->island;
     for (int i = 0; i < 3 * island->n_bodies; i++) {
@@ -193,8 +191,8 @@ carom_status crm_correction_vjp(crm_reverse *r, crm_substep *s, const crm_solve 
     }
     const carom_status e = crm_solve_vjp(r, s, c, r->pose_bar);
     if (e < 0) return e;
-    if (with_parameters) crm_mass_vjp(r);
-    crm_rows_vjp(r, s, c, r->bars.cn, r->bars.ce, q_bar, with_parameters);
+    crm_mass_vjp(r);
+    crm_rows_vjp(r, s, c, r->bars.cn, r->bars.ce, q_bar);
     return CAROM_OK;
 }
 
@@ -211,51 +209,49 @@ void crm_move_vjp(const carom_world *w, const crm_substep *s, const double *v, c
 }
 
 carom_status crm_euler_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                           int with_parameters, double *h_bar)
+                           double *h_bar)
 {
     const crm_solve *c = &s->solve[0];
     *h_bar = 0;
     for (int k = s->n_solves - 1; k > 0; k--) {
-        const carom_status e = crm_correction_vjp(r, s, &s->solve[k], q_bar, with_parameters);
+        const carom_status e = crm_correction_vjp(r, s, &s->solve[k], q_bar);
         if (e < 0) return e;
     }
     crm_move_vjp(r->world, s, c->v, q_bar, v_bar, h_bar);
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
     crm_zero(r->world, v_bar);
-    crm_free_velocity_vjp(r, s, s->h, 1, v_bar, h_bar, with_parameters);
-    crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar, with_parameters);
-    if (with_parameters) crm_mass_vjp(r);
-    crm_targets_vjp(r, s, s->v0, v_bar, r->gap_bar, h_bar, with_parameters);
-    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar, with_parameters);
+    crm_free_velocity_vjp(r, s, s->h, 1, v_bar, h_bar);
+    crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar);
+    crm_mass_vjp(r);
+    crm_targets_vjp(r, s, s->v0, v_bar, r->gap_bar, h_bar);
+    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar);
     return CAROM_OK;
 }
 
-carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                            int with_parameters)
+carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar)
 {
     const crm_solve *c = &s->solve[0];
     double none = 0;
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
     crm_zero(r->world, v_bar);
-    crm_free_velocity_vjp(r, s, 0, 0, v_bar, &none, with_parameters);
-    if (with_parameters) crm_mass_vjp(r);
-    crm_targets_vjp(r, s, s->v0, v_bar, r->gap_bar, &none, with_parameters);
-    crm_rows_vjp(r, s, c, NULL, NULL, q_bar, with_parameters);
+    crm_free_velocity_vjp(r, s, 0, 0, v_bar, &none);
+    crm_mass_vjp(r);
+    crm_targets_vjp(r, s, s->v0, v_bar, r->gap_bar, &none);
+    crm_rows_vjp(r, s, c, NULL, NULL, q_bar);
     return CAROM_OK;
 }
 
 carom_status crm_substep_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                             int with_parameters, double *h_bar)
+                             double *h_bar)
 {
     *h_bar = 0;
     switch (s->map) {
-    case CRM_MAP_IMPACT: return crm_impact_vjp(r, s, q_bar, v_bar, with_parameters);
-    case CRM_MAP_SMOOTH: return crm_smooth_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
-    case CRM_MAP_EXTRAPOLATED:
-        return crm_extrapolated_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+    case CRM_MAP_IMPACT: return crm_impact_vjp(r, s, q_bar, v_bar);
+    case CRM_MAP_SMOOTH: return crm_smooth_vjp(r, s, q_bar, v_bar, h_bar);
+    case CRM_MAP_EXTRAPOLATED: return crm_extrapolated_vjp(r, s, q_bar, v_bar, h_bar);
     case CRM_MAP_EULER: break;
     }
-    return crm_euler_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+    return crm_euler_vjp(r, s, q_bar, v_bar, h_bar);
 }

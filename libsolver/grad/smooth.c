@@ -1,4 +1,4 @@
-/* smooth.c: the two-stage map backward and forward.  Stage 1 ends at the fixed point v = G(v) of a
+/* smooth.c: the two-stage map backward.  Stage 1 ends at the fixed point v = G(v) of a
  * Newton iteration with fixed rows.  Its adjoint is that of one iteration with the cotangent
  * l + G'l + G'G'l + ..., a sum that converges as the iteration did; G' needs a transposed solve and
  * the rows at the end of the sub-step.  Where that is slow or diverges, the sum m = l + G'm is
@@ -7,14 +7,8 @@
 
 #include <math.h>
 
-/* Passes end when the rest is below this [cotangent of the first pass]. */
-static const double PASS_TOL = 1e-15;
-enum { MAX_PASSES = 60 };
-/* Where a pass leaves more than this of the rest, the sum is found otherwise [1]. */
-static const double SLOW = 0.3;
+/* Further passes need fewer digits, of which so many are spare [1]. */
 static const double SPARE = 1e-2;
-/* A rest above this after all passes: no gradient rather than a wrong one. */
-static const double PASS_LOOSE = 1e-9;
 
 static void add_row(double *v_bar, int body_a, int body_b, const double row[6], double scale)
 {
@@ -52,8 +46,8 @@ static void end_of_contact_vjp(crm_reverse *r, const crm_substep *s, int k, doub
 {
     const crm_contact *x = &s->contacts[k];
     const carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, gap_bar};
-    crm_geometry_vjp(r, r->pose, x, &bar, r->pose_bar, 1);
-    if (slip_bar != 0) crm_slip_vjp(r, x, s->q0, r->pose, slip_bar, q0_bar, r->pose_bar, 1);
+    crm_geometry_vjp(r, r->pose, x, &bar, r->pose_bar);
+    if (slip_bar != 0) crm_slip_vjp(r, x, s->q0, r->pose, slip_bar, q0_bar, r->pose_bar);
 }
 
 /* The same by the poses alone: rows at both ends. */
@@ -77,7 +71,7 @@ static void end_of_rows_vjp(crm_reverse *r, const crm_substep *s, int k, double 
  * point, which ends at p = q0 + h v and where rows that hold miss nothing: gap(p) = target and slip
  * = 0, so that 1 / h has no part.  Adds to rows, r->pose_bar, q0_bar, h_bar, gap_bar. */
 static void contact_side_vjp(crm_reverse *r, const crm_substep *s, int k, double *q0_bar,
-                             double *h_bar, int with_parameters)
+                             double *h_bar)
 {
     const carom_world *w = r->world;
     const double *v = s->solve[0].v;
@@ -88,7 +82,7 @@ static void contact_side_vjp(crm_reverse *r, const crm_substep *s, int k, double
     if (cn_bar == 0 && ct_bar == 0) return;
     add_outer(&r->bars.jn[6 * k], x.body_a, x.body_b, v, -cn_bar);
     add_outer(&r->bars.jt[6 * k], x.body_a, x.body_b, v, -ct_bar);
-    if (with_parameters && (x.limit || r->wants_shapes)) {
+    if (x.limit || r->wants_shapes) {
         end_of_contact_vjp(r, s, k, cn_bar / h, ct_bar / h, q0_bar);
     } else {
         end_of_rows_vjp(r, s, k, cn_bar / h, ct_bar / h, q0_bar);
@@ -102,7 +96,7 @@ static void contact_side_vjp(crm_reverse *r, const crm_substep *s, int k, double
 /* c_e = (error(p) - target) / h - J_e v of one joint, whose first row in the island is `first`;
  * target = error(q0) -+ recovery h, or 0. */
 static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int first,
-                           double *q0_bar, double *h_bar, int with_parameters)
+                           double *q0_bar, double *h_bar)
 {
     const carom_world *w = r->world;
     const crm_joint *j = &w->joints[joint];
@@ -120,16 +114,16 @@ static void joint_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int 
         start_bar[i] = target != 0 ? -ce_bar / h : 0;
         targets |= target != 0;
         if (target != 0) *h_bar += ce_bar * copysign(w->recovery, target) / h;
-        if (with_parameters && r->wants_joints) continue;
+        if (r->wants_joints) continue;
         add_row(r->pose_bar, j->body_a, j->body_b, &w->rows.je[6 * row], error_bar[i]);
         add_row(r->pose_bar, j->body_a, j->body_b, &r->turn.e[6 * row], error_bar[i]);
     }
-    if (with_parameters && r->wants_joints) {
-        crm_joint_vjp(r, r->pose, joint, NULL, error_bar, r->pose_bar, 1);
+    if (r->wants_joints) {
+        crm_joint_vjp(r, r->pose, joint, NULL, error_bar, r->pose_bar);
     }
-    if (targets) crm_joint_vjp(r, s->q0, joint, NULL, start_bar, q0_bar, with_parameters);
+    if (targets) crm_joint_vjp(r, s->q0, joint, NULL, start_bar, q0_bar);
     if (j->n_rows > j->n_held) {
-        crm_motor_side_vjp(r, s, joint, first + j->n_held, q0_bar, h_bar, with_parameters);
+        crm_motor_side_vjp(r, s, joint, first + j->n_held, q0_bar, h_bar);
     }
 }
 
@@ -169,19 +163,18 @@ void crm_turn_start(const carom_world *w, const crm_substep *s, crm_turn *turn)
 }
 
 /* Right-hand sides at the fixed point, from r->bars. */
-static void sides_vjp(crm_reverse *r, const crm_substep *s, double *q0_bar, double *h_bar,
-                      int with_parameters)
+static void sides_vjp(crm_reverse *r, const crm_substep *s, double *q0_bar, double *h_bar)
 {
     const carom_world *w = r->world;
     memset(r->pose_bar, 0, 3 * (size_t)w->n_bodies * sizeof(double));
     for (int k = 0; k < s->n_contacts; k++) {
         r->gap_bar[k] = 0;
-        contact_side_vjp(r, s, k, q0_bar, h_bar, with_parameters);
+        contact_side_vjp(r, s, k, q0_bar, h_bar);
     }
     int row = 0;
     for (int k = 0; k < w->island->n_joints; k++) {
         const int joint = w->island->joints[k];
-        joint_side_vjp(r, s, joint, row, q0_bar, h_bar, with_parameters);
+        joint_side_vjp(r, s, joint, row, q0_bar, h_bar);
         row += w->joints[joint].n_rows;
     }
     for (int k = 0; k < 3 * w->n_bodies; k++) {
@@ -219,7 +212,7 @@ static void add_to_total(crm_reverse *r)
     for (size_t i = 0; i < r->n_sides; i++) r->total.u[i] += r->bars.u[i];
 }
 
-static double largest(const carom_world *w, const double *x)
+double crm_largest(const carom_world *w, const double *x)
 {
     double top = 0;
     for (int i = 0; i < w->island->n_bodies; i++) {
@@ -231,27 +224,27 @@ static double largest(const carom_world *w, const double *x)
 
 /* v1 from vh at q1: leaves the cotangent of vh in r->solve_bar; q_bar gets that of the rows. */
 static carom_status stage_2_vjp(crm_reverse *r, crm_substep *s, double *q_bar, const double *v_bar,
-                                int with_parameters, double *h_bar)
+                                double *h_bar)
 {
     const crm_solve *c = &s->solve[1];
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
     crm_zero(r->world, r->solve_bar);
-    crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, r->solve_bar, h_bar, with_parameters);
-    crm_drive_vjp(r, s, c, r->solve_bar, q_bar, h_bar, with_parameters);
-    if (with_parameters) crm_mass_vjp(r);
+    crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, r->solve_bar, h_bar);
+    crm_drive_vjp(r, s, c, r->solve_bar, q_bar, h_bar);
+    crm_mass_vjp(r);
     for (int k = 0; k < s->n_contacts; k++) {
         const int open = c->cn[k] != 0;
         r->gap_bar[k] = open ? r->bars.cn[k] / s->h : 0;
         if (open) *h_bar -= r->bars.cn[k] * c->cn[k] / s->h;
     }
-    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar, with_parameters);
+    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar);
     return CAROM_OK;
 }
 
 /* c_n of a bounce: e J_n v0 where it is negative, gap / h where it is positive. */
 static void bounce_side_vjp(crm_reverse *r, const crm_substep *s, int k, double *v0_bar,
-                            double *h_bar, int with_parameters)
+                            double *h_bar)
 {
     const carom_world *w = r->world;
     const crm_contact *x = &s->moved[k];
@@ -265,23 +258,23 @@ static void bounce_side_vjp(crm_reverse *r, const crm_substep *s, int k, double 
     const double un = crm_row_dot(jn, s->v0, x->body_a, x->body_b);
     add_row(v0_bar, x->body_a, x->body_b, jn, cn_bar * cn / un);
     add_outer(&r->bars.jn[6 * k], x->body_a, x->body_b, s->v0, cn_bar * cn / un);
-    if (with_parameters) crm_restitution_vjp(r, s, x, cn_bar * un);
+    crm_restitution_vjp(r, s, x, cn_bar * un);
 }
 
 /* v1 from v0 at q1; stage 1 then only counts for the pose. */
 static carom_status bounce_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                               int with_parameters, double *h_bar)
+                               double *h_bar)
 {
     const crm_solve *c = &s->solve[1];
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
     crm_zero(r->world, r->solve_bar);
     crm_zero(r->world, v_bar);
-    crm_free_velocity_vjp(r, s, s->h, 1, v_bar, h_bar, with_parameters);
-    crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar, with_parameters);
-    if (with_parameters) crm_mass_vjp(r);
-    for (int k = 0; k < s->n_contacts; k++) bounce_side_vjp(r, s, k, v_bar, h_bar, with_parameters);
-    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar, with_parameters);
+    crm_free_velocity_vjp(r, s, s->h, 1, v_bar, h_bar);
+    crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar);
+    crm_mass_vjp(r);
+    for (int k = 0; k < s->n_contacts; k++) bounce_side_vjp(r, s, k, v_bar, h_bar);
+    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar);
     return CAROM_OK;
 }
 
@@ -296,9 +289,9 @@ static carom_status sum_passes(crm_reverse *r, const crm_substep *s, double tol,
     if (e < 0) return e;
     crm_copy(w, r->rest, r->solve_bar);
     crm_gather(w, r->rest, a->point);
-    for (int k = 0; k < MAX_PASSES && error > tol; k++) {
+    for (int k = 0; k < CRM_MAX_PASSES && error > tol; k++) {
         crm_scatter(w, a->point, r->solve_bar);
-        e = pass_vjp(r, s, r->solve_bar, r->solve_bar, PASS_TOL);
+        e = pass_vjp(r, s, r->solve_bar, r->solve_bar, CRM_PASS_TOL);
         if (e < 0) return e;
         crm_gather(w, r->solve_bar, a->value);
         error = 0;
@@ -317,29 +310,29 @@ static carom_status sum_passes(crm_reverse *r, const crm_substep *s, double tol,
 static carom_status close_vjp(crm_reverse *r, const crm_substep *s)
 {
     const carom_world *w = r->world;
-    const double first = largest(w, r->solve_bar);
+    const double first = crm_largest(w, r->solve_bar);
     double last = HUGE_VAL;
     memset(r->total.u, 0, r->n_sides * sizeof(double));
-    for (int k = 0; k < MAX_PASSES; k++) {
-        const double rest = largest(w, r->solve_bar);
-        if (k > 0 && rest <= PASS_TOL * first) return CAROM_OK;
+    for (int k = 0; k < CRM_MAX_PASSES; k++) {
+        const double rest = crm_largest(w, r->solve_bar);
+        if (k > 0 && rest <= CRM_PASS_TOL * first) return CAROM_OK;
         if (!(rest < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
-        const int slow = k > 1 && rest > SLOW * last;
+        const int slow = k > 1 && rest > CRM_SLOW * last;
         /* What is left needs fewer digits; SPARE, for masses differ. */
-        const double tol = k > 0 ? PASS_TOL * (slow ? 1 : SPARE * first / rest) : 0;
+        const double tol = k > 0 ? CRM_PASS_TOL * (slow ? 1 : SPARE * first / rest) : 0;
         carom_status e = CAROM_OK;
-        if (slow) e = sum_passes(r, s, PASS_TOL * first, PASS_LOOSE * fmax(first, rest));
+        if (slow) e = sum_passes(r, s, CRM_PASS_TOL * first, CRM_PASS_LOOSE * fmax(first, rest));
         if (e >= 0) e = pass_vjp(r, s, r->solve_bar, r->solve_bar, tol);
         if (e >= 0) add_to_total(r);
         if (e < 0 || slow) return e;
         last = rest;
     }
-    return largest(w, r->solve_bar) <= PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
+    return crm_largest(w, r->solve_bar) <= CRM_PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
 }
 
 /* Stage 1 backward from the cotangent r->solve_bar of its velocity. */
 static carom_status stage_1_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                                int with_parameters, double *h_bar)
+                                double *h_bar)
 {
     const crm_solve *c = &s->solve[0];
     /* The rows in place are those at the end of stage 1, of what the sub-step did next. */
@@ -353,253 +346,29 @@ static carom_status stage_1_vjp(crm_reverse *r, crm_substep *s, double *q_bar, d
     memcpy(r->bars.u, r->total.u, r->n_sides * sizeof(double));
     e = crm_rest_vjp(r);
     if (e < 0) return e;
-    crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, v_bar, h_bar, with_parameters);
-    crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar, with_parameters);
-    if (with_parameters) crm_mass_vjp(r);
-    sides_vjp(r, s, q_bar, h_bar, with_parameters);
-    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar, with_parameters);
+    crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, v_bar, h_bar);
+    crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar);
+    crm_mass_vjp(r);
+    sides_vjp(r, s, q_bar, h_bar);
+    crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar);
     return CAROM_OK;
 }
 
 carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double *v_bar,
-                            int with_parameters, double *h_bar)
+                            double *h_bar)
 {
     *h_bar = 0;
     carom_status e;
     if (s->solve[1].kind == CRM_BOUNCE) {
-        e = bounce_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+        e = bounce_vjp(r, s, q_bar, v_bar, h_bar);
     } else {
         crm_zero(r->world, r->late_bar);
-        e = stage_2_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
+        e = stage_2_vjp(r, s, q_bar, v_bar, h_bar);
         crm_copy(r->world, v_bar, r->late_bar);
     }
     for (int k = s->n_solves - 1; e >= 0 && k > 1; k--) {
-        e = crm_correction_vjp(r, s, &s->solve[k], q_bar, with_parameters);
+        e = crm_correction_vjp(r, s, &s->solve[k], q_bar);
     }
     crm_move_vjp(r->world, s, s->solve[0].v, q_bar, r->solve_bar, h_bar);
-    return e < 0 ? e : stage_1_vjp(r, s, q_bar, v_bar, with_parameters, h_bar);
-}
-
-/* --- forward: the transposes of the above ------------------------------------------------------
- */
-
-/* Of c_n and c_t of one contact in an iteration. */
-static void contact_side_jvp(crm_forward *f, const crm_substep *s, int k, const crm_line *line,
-                             const double *v)
-{
-    const carom_world *w = f->world;
-    const double h = s->h;
-    const crm_contact *c = &s->contacts[k];
-    const int a = c->body_a;
-    const int b = c->body_b;
-    const double un = crm_row_dot(&f->dot.jn[6 * k], v, a, b);
-    const double start = s->target[k] != 0 ? f->gap[k] + w->recovery * line->h : 0;
-    const carom_contact_dot end = crm_geometry_jvp(w, f->pose, c, f->pose_dot, line->by);
-    f->dot.cn[k] = (end.gap - start) / h - un;
-    f->dot.ct[k] = 0;
-    if (!(w->rows.mu[k] > 0)) return;
-    const double ut = crm_row_dot(&f->dot.jt[6 * k], v, a, b);
-    f->dot.ct[k] = crm_slip_jvp(w, c, s->q0, f->pose, line->q, f->pose_dot, line->by) / h - ut;
-}
-
-/* Of c_e of one joint, whose first row in the island is `first`. */
-static void joint_side_jvp(crm_forward *f, const crm_substep *s, int joint, int first,
-                           const crm_line *line, const double *v)
-{
-    const carom_world *w = f->world;
-    const crm_joint *j = &w->joints[joint];
-    const crm_measure *measures;
-    const double h = s->h;
-    double row_dot[6];
-    const int held = crm_joint_measures(j->kind, &measures);
-    for (int i = 0; i < held; i++) {
-        const int row = first + i;
-        const double target = s->joint_target[row];
-        const double start =
-            target != 0 ? f->error[row] - copysign(w->recovery, target) * line->h : 0;
-        const double end =
-            crm_measure_jvp(w, joint, measures[i], f->pose, f->pose_dot, line->by, row_dot);
-        f->dot.ce[row] =
-            (end - start) / h - crm_row_dot(&f->dot.je[6 * row], v, j->body_a, j->body_b);
-    }
-}
-
-/* Right-hand sides along the line, at no change of the velocity v of the fixed point. */
-static void sides_jvp(crm_forward *f, const crm_substep *s, const crm_line *line)
-{
-    const carom_world *w = f->world;
-    const double *v = s->solve[0].v;
-    memcpy(f->pose_dot, line->q, 3 * (size_t)w->n_bodies * sizeof *v);
-    for (int i = 0; i < w->island->n_bodies; i++) {
-        const int b = 3 * w->island->bodies[i];
-        for (int k = b; k < b + 3; k++) f->pose_dot[k] += line->h * v[k];
-    }
-    for (int k = 0; k < s->n_contacts; k++) contact_side_jvp(f, s, k, line, v);
-    int row = 0;
-    for (int k = 0; k < w->island->n_joints; k++) {
-        const int joint = w->island->joints[k];
-        const crm_joint *j = &w->joints[joint];
-        joint_side_jvp(f, s, joint, row, line, v);
-        row += j->n_rows;
-        if (j->n_rows == j->n_held) continue;
-        f->dot.ce[row - 1] += crm_motor_side_jvp(f, s, joint, row - 1, line);
-    }
-}
-
-/* One pass: what the change x of the velocity gives to it, the data at rest. */
-static carom_status pass_jvp(crm_forward *f, const crm_substep *s, const double *x, double *to)
-{
-    const carom_world *w = f->world;
-    for (int k = 0; k < s->n_contacts; k++) {
-        const crm_contact *c = &s->contacts[k];
-        f->dot.cn[k] = crm_row_dot(&f->turn.n[6 * k], x, c->body_a, c->body_b);
-        f->dot.ct[k] = crm_row_dot(&f->turn.t[6 * k], x, c->body_a, c->body_b);
-    }
-    int row = 0;
-    for (int k = 0; k < w->island->n_joints; k++) {
-        const crm_joint *j = &w->joints[w->island->joints[k]];
-        for (int i = 0; i < j->n_rows; i++, row++) {
-            f->dot.ce[row] = crm_row_dot(&f->turn.e[6 * row], x, j->body_a, j->body_b);
-        }
-    }
-    return crm_sides_jvp(f, to);
-}
-
-/* sum += m with m = rest + A m, A one pass, known to within tol. */
-static carom_status sum_passes_jvp(crm_forward *f, const crm_substep *s, double *sum, double tol,
-                                   double loose)
-{
-    carom_world *w = f->world;
-    crm_anderson *a = &w->anderson;
-    const int n = 3 * w->island->n_bodies;
-    double error = HUGE_VAL;
-    carom_status e = crm_anderson_start(&w->memory, a, n);
-    if (e < 0) return e;
-    crm_gather(w, f->rest, a->point);
-    for (int k = 0; k < MAX_PASSES && error > tol; k++) {
-        crm_scatter(w, a->point, f->trial);
-        e = pass_jvp(f, s, f->trial, f->trial);
-        if (e < 0) return e;
-        error = 0;
-        crm_gather(w, f->trial, a->value);
-        for (int i = 0; i < n; i++) {
-            a->value[i] += f->rest[3 * w->island->bodies[i / 3] + i % 3];
-            error = fmax(error, fabs(a->value[i] - a->point[i]));
-        }
-        if (!(error < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
-        crm_anderson_next(a);
-    }
-    crm_scatter(w, a->point, f->trial);
-    crm_move(w, sum, f->trial, 1);
-    return error <= loose ? CAROM_OK : CAROM_E_NO_SOLUTION;
-}
-
-/* The change of the fixed point, sum = rest + A rest + A A rest + ..., from its first term. */
-static carom_status close_jvp(crm_forward *f, const crm_substep *s, double *sum)
-{
-    const carom_world *w = f->world;
-    const double first = largest(w, f->rest);
-    double last = HUGE_VAL;
-    crm_zero(w, sum);
-    if (!s->n_contacts && !w->island->n_rows) {
-        crm_copy(w, sum, f->rest);
-        return CAROM_OK;
-    }
-    for (int k = 0; k < MAX_PASSES; k++) {
-        const double rest = largest(w, f->rest);
-        if (rest <= PASS_TOL * first) return CAROM_OK;
-        if (!(rest < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
-        if (k > 1 && rest > SLOW * last) {
-            return sum_passes_jvp(f, s, sum, PASS_TOL * first, PASS_LOOSE * fmax(first, rest));
-        }
-        crm_move(w, sum, f->rest, 1);
-        const carom_status e = pass_jvp(f, s, f->rest, f->rest);
-        if (e < 0) return e;
-        last = rest;
-    }
-    return largest(w, f->rest) <= PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
-}
-
-static carom_status stage_1_jvp(crm_forward *f, crm_substep *s, int n)
-{
-    const crm_solve *c = &s->solve[0];
-    carom_world *w = f->world;
-    crm_copy(w, f->pose, s->q0);
-    crm_move(w, f->pose, c->v, s->h);
-    crm_rows_at(w, s, f->pose);
-    crm_turn_end(w, s, f->pose, &f->turn);
-    crm_begin_solve(f, s, c);
-    crm_turn_start(w, s, &f->turn);
-    for (int i = 0; i < n; i++) {
-        crm_line *line = &f->lines[i];
-        crm_copy(w, line->v0, line->v);
-        crm_rows_jvp(f, s, c, line);
-        crm_free_velocity_jvp(f, s, line, line->v0, 0.5 * s->h, 0.5);
-        crm_drive_jvp(f, s, c, line);
-        sides_jvp(f, s, line);
-        carom_status e = crm_solve_jvp(f, f->rest);
-        if (e >= 0) e = close_jvp(f, s, line->v);
-        if (e < 0) return e;
-        crm_move_jvp(w, s, c->v, line->h, line->v, line->q);
-    }
-    return CAROM_OK;
-}
-
-/* c_n of a contact that has opened, gap / h. */
-static carom_status stage_2_jvp(crm_forward *f, crm_substep *s, int n)
-{
-    const crm_solve *c = &s->solve[1];
-    crm_begin_solve(f, s, c);
-    for (int i = 0; i < n; i++) {
-        crm_line *line = &f->lines[i];
-        crm_rows_jvp(f, s, c, line);
-        crm_free_velocity_jvp(f, s, line, line->v, 0.5 * s->h, 0.5);
-        crm_drive_jvp(f, s, c, line);
-        for (int k = 0; k < s->n_contacts; k++) {
-            if (c->cn[k] != 0) f->dot.cn[k] = (f->gap[k] - c->cn[k] * line->h) / s->h;
-        }
-        const carom_status e = crm_solve_jvp(f, line->v);
-        if (e < 0) return e;
-    }
-    return CAROM_OK;
-}
-
-/* Of c_n of a bounce. */
-static double bounce_side_jvp(const crm_forward *f, const crm_substep *s, int k,
-                              const crm_line *line)
-{
-    const carom_world *w = f->world;
-    const crm_contact *x = &s->moved[k];
-    const double cn = s->solve[1].cn[k];
-    const double *jn = &w->rows.jn[6 * k];
-    if (x->gap > w->settings.margin * w->length) return (f->gap[k] - cn * line->h) / s->h;
-    if (cn >= 0) return 0;
-    const double un = crm_row_dot(jn, s->v0, x->body_a, x->body_b);
-    const double un_dot = crm_row_dot(&f->dot.jn[6 * k], s->v0, x->body_a, x->body_b) +
-                          crm_row_dot(jn, line->v0, x->body_a, x->body_b);
-    return cn / un * un_dot + crm_restitution_jvp(w, s, x, line->by) * un;
-}
-
-static carom_status bounce_jvp(crm_forward *f, crm_substep *s, int n)
-{
-    const crm_solve *c = &s->solve[1];
-    crm_begin_solve(f, s, c);
-    for (int i = 0; i < n; i++) {
-        crm_line *line = &f->lines[i];
-        crm_rows_jvp(f, s, c, line);
-        crm_free_velocity_jvp(f, s, line, line->v0, s->h, 1);
-        crm_drive_jvp(f, s, c, line);
-        for (int k = 0; k < s->n_contacts; k++) f->dot.cn[k] = bounce_side_jvp(f, s, k, line);
-        const carom_status e = crm_solve_jvp(f, line->v);
-        if (e < 0) return e;
-    }
-    return CAROM_OK;
-}
-
-carom_status crm_smooth_jvp(crm_forward *f, crm_substep *s, int n)
-{
-    carom_status e = stage_1_jvp(f, s, n);
-    for (int k = 2; e >= 0 && k < s->n_solves; k++) e = crm_correction_jvp(f, s, &s->solve[k], n);
-    if (e < 0) return e;
-    return s->solve[1].kind == CRM_BOUNCE ? bounce_jvp(f, s, n) : stage_2_jvp(f, s, n);
+    return e < 0 ? e : stage_1_vjp(r, s, q_bar, v_bar, h_bar);
 }

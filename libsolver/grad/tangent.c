@@ -3,12 +3,6 @@
 
 #include <math.h>
 
-/* The line that moves by the length of a sub-step alone, for the time of an event. */
-static crm_line *clockwork(const crm_forward *f)
-{
-    return &f->lines[f->n];
-}
-
 static void lay_line(crm_line *line, crm_block *b, const carom_world *w)
 {
     const size_t n3 = 3 * (size_t)w->n_bodies;
@@ -64,8 +58,7 @@ static carom_status allocate(crm_forward *f)
     return CAROM_OK;
 }
 
-/* Change of the indicator that ended the sub-step, at the changed (q1, v1) of the line. */
-static double event_jvp(const crm_forward *f, const crm_substep *s, const crm_line *line)
+double crm_event_jvp(const crm_forward *f, const crm_substep *s, const crm_line *line)
 {
     const crm_contact *c = &s->event;
     const carom_contact_dot dot = crm_geometry_jvp(f->world, s->q1, c, line->q, line->by);
@@ -79,15 +72,16 @@ static double event_jvp(const crm_forward *f, const crm_substep *s, const crm_li
            crm_row_dot(jt_dot, s->v1, c->body_a, c->body_b);
 }
 
-static void begin_clockwork(const crm_forward *f)
+crm_line *crm_begin_clockwork(const crm_forward *f)
 {
     static const carom_gradient none = {0};
-    crm_line *clock = clockwork(f);
+    crm_line *clock = &f->lines[f->n];
     const size_t bytes = 3 * (size_t)f->world->n_bodies * sizeof(double);
     memset(clock->q, 0, bytes);
     memset(clock->v, 0, bytes);
     clock->by = &none;
     clock->h = 1;
+    return clock;
 }
 
 /* The sub-step ended at the root h of g, so that g_dot + (dg/dh) h_dot = 0, with g_dot at constant
@@ -95,19 +89,18 @@ static void begin_clockwork(const crm_forward *f)
 static carom_status locate_jvp(crm_forward *f, crm_substep *s)
 {
     const carom_world *w = f->world;
-    const crm_line *clock = clockwork(f);
+    const crm_line *clock = crm_begin_clockwork(f);
     for (int i = 0; i < f->n; i++) f->lines[i].h = 0;
-    begin_clockwork(f);
     const carom_status e = crm_substep_jvp(f, s, f->n + 1);
     if (e < 0) return e;
-    const double slope = event_jvp(f, s, clock);
+    const double slope = crm_event_jvp(f, s, clock);
     if (fabs(slope) <= crm_grazing(w, s)) {
         f->stats.degenerate++;
         return CAROM_OK;
     }
     for (int i = 0; i < f->n; i++) {
         crm_line *line = &f->lines[i];
-        const double h = -event_jvp(f, s, line) / slope;
+        const double h = -crm_event_jvp(f, s, line) / slope;
         crm_move(w, line->q, clock->q, h);
         crm_move(w, line->v, clock->v, h);
         line->left -= h;
