@@ -32,6 +32,16 @@ static carom_status reserve(carom_world *w, int more)
     return e;
 }
 
+carom_status crm_events_append(carom_world *w, const carom_contact_event *list, int n)
+{
+    crm_events *s = &w->events;
+    const carom_status e = reserve(w, n);
+    if (e) return e;
+    memcpy(&s->list[s->n], list, (size_t)n * sizeof *list);
+    s->n += n;
+    return CAROM_OK;
+}
+
 /* There is room for it. */
 static carom_contact_event *put(carom_world *w, carom_event_kind kind, const crm_touch *t,
                                 double time)

@@ -202,6 +202,8 @@ double crm_drive_gain(const carom_world *w, const crm_substep *s);
 
 /* substep.c: memory of sub-steps and rows; contacts found so far are kept when it grows. */
 carom_status crm_substep_create(carom_world *w, crm_substep *s);
+/* sub, and where the order asks for them the inner ones. */
+carom_status crm_substeps_create(carom_world *w);
 carom_status crm_substep_reserve(carom_world *w, crm_substep *s, int n_contacts);
 void crm_substep_free(carom_world *w, crm_substep *s);
 carom_status crm_rows_create(carom_world *w);
@@ -214,6 +216,21 @@ carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use
 /* The same for a problem with restitution, unless plastic; where that leaves no solution, without,
  * then without friction, then with as much approach as must be. */
 carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, int plastic);
+
+/* step.c: the static bodies of all states that a sub-step works with. */
+void crm_put_statics(carom_world *w);
+
+/* threads.c: islands shared among threads; the same bits for any number of them. */
+typedef carom_status crm_advance(carom_world *w, const crm_island *island);
+/* As many as settings.threads allows and the islands give work to; 1: none are made. */
+int crm_threads_that_pay(const carom_world *w);
+/* Advances all islands with n > 1 threads; the status of the first one that fails. */
+carom_status crm_advance_shared(carom_world *w, int n, crm_advance *advance);
+void crm_stats_add(carom_step_stats *sum, const carom_step_stats *part);
+void crm_threads_free(carom_world *w);
+
+/* world.c: the contact solver of the world's settings. */
+carom_status crm_solver_create(carom_world *w);
 
 /* energy.c */
 /* Speed of the island in the mass metric: sqrt(v' M v). */
@@ -235,6 +252,10 @@ double crm_rounding(const carom_world *w);
 void crm_guess_load(carom_world *w, double h);
 /* Contacts of sub as the island's touches. */
 carom_status crm_touches_save(carom_world *w);
+/* Room for n touches of the frame under way. */
+carom_status crm_touches_reserve(carom_world *w, int n);
+/* As much room in both lists, for they take turns. */
+carom_status crm_touches_even(carom_world *w);
 void crm_forget_guesses(carom_world *w);
 /* The frame is done: next becomes the touches, ordered. */
 void crm_touches_turn(carom_world *w);
@@ -320,6 +341,8 @@ int crm_is_too_long(const carom_world *w, double *h);
 void crm_events_free(carom_world *w);
 /* Impacts of the sub-step just committed, which began so long after the step did. */
 carom_status crm_events_note(carom_world *w, double time);
+/* Events that another thread has noted. */
+carom_status crm_events_append(carom_world *w, const carom_contact_event *list, int n);
 /* Room for all that crm_events_compare could find. */
 carom_status crm_events_reserve(carom_world *w);
 /* What the touches have that the n_before of the last step had not, and the other way round. */

@@ -122,12 +122,7 @@ static carom_status allocate(carom_world *w)
     lay_world(w, &b);
     carom_status e = crm_rows_create(w);
     if (!e) e = crm_islands_create(w);
-    if (!e) e = crm_substep_create(w, &w->sub);
-    const int columns = w->settings.order / 2;
-    for (int k = 0; !e && columns > 1 && k < columns * (columns + 1) / 2; k++) {
-        e = crm_substep_create(w, &w->inner[k]);
-    }
-    return e;
+    return e ? e : crm_substeps_create(w);
 }
 
 /* The deepest overlap among sub.contacts, or -1. */

@@ -32,8 +32,12 @@ static void hash_number(crm_coder *c, double x)
     crm_code_number(c, &x, 0, 0);
 }
 
-static void hash_settings(crm_coder *c, const carom_world_settings *s)
+/* How many threads there are changes nothing. */
+static void hash_settings(crm_coder *c, const carom_world_settings *settings)
 {
+    carom_world_settings own = *settings;
+    const carom_world_settings *s = &own;
+    own.threads = 1;
 #define HASH_SETTING(name, type, value, unit, text) hash_number(c, (double)s->name);
     CAROM_WORLD_SETTINGS(HASH_SETTING)
 #undef HASH_SETTING

@@ -271,12 +271,22 @@ static crm_touch touch_of(const crm_substep *s, int k)
     return t;
 }
 
-static carom_status reserve_touches(carom_world *w, crm_touches *t, int n)
+static carom_status reserve(carom_world *w, crm_touches *t, int n)
 {
     void *p = t->list;
     const carom_status e = crm_reserve(&w->memory, &p, &t->max, n, sizeof *t->list);
     t->list = p;
     return e;
+}
+
+carom_status crm_touches_reserve(carom_world *w, int n)
+{
+    return reserve(w, &w->next, n);
+}
+
+carom_status crm_touches_even(carom_world *w)
+{
+    return reserve(w, &w->touches, w->next.n);
 }
 
 static void save_joint_forces(carom_world *w)
@@ -297,9 +307,7 @@ carom_status crm_touches_save(carom_world *w)
 {
     const crm_substep *s = &w->sub;
     crm_touches *t = &w->next;
-    /* Both lists, for they take turns. */
-    carom_status e = reserve_touches(w, t, w->first_touch + s->n_contacts);
-    if (!e) e = reserve_touches(w, &w->touches, w->first_touch + s->n_contacts);
+    const carom_status e = crm_touches_reserve(w, w->first_touch + s->n_contacts);
     if (e) return e;
     t->n = w->first_touch + s->n_contacts;
     for (int k = 0; k < s->n_contacts; k++) t->list[w->first_touch + k] = touch_of(s, k);

@@ -184,17 +184,23 @@ static carom_status advance_island(carom_world *w, const crm_island *island)
 
 static carom_status advance_islands(carom_world *w)
 {
+    carom_step_stats *sum = w->stats;
+    const int threads = crm_threads_that_pay(w);
+    carom_status e = CAROM_OK;
     w->next.n = 0;
     w->events.n = 0;
-    for (int k = 0; k < w->islands.n; k++) {
-        const carom_status e = advance_island(w, &w->islands.list[k]);
-        if (e < 0) return e;
+    if (threads > 1) return crm_advance_shared(w, threads, advance_island);
+    for (int k = 0; e >= 0 && k < w->islands.n; k++) {
+        carom_step_stats part = {0};
+        w->stats = &part;
+        e = advance_island(w, &w->islands.list[k]);
+        crm_stats_add(sum, &part);
     }
-    return CAROM_OK;
+    w->stats = sum;
+    return e;
 }
 
-/* The static bodies of all states that a sub-step works with. */
-static void place_statics(carom_world *w)
+void crm_put_statics(carom_world *w)
 {
     if (w->statics_placed) return;
     const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
@@ -277,13 +283,12 @@ static carom_status step(carom_world *w, const double *force)
     carom_status e = crm_seal(w);
     if (!e) e = take_forces(w, force);
     if (e < 0) return e;
-    place_statics(w);
+    crm_put_statics(w);
     save_state(w);
     e = advance(w);
-    if (e >= 0 && w->events.on) {
-        const carom_status full = crm_events_reserve(w);
-        if (full) e = full;
-    }
+    carom_status full = e < 0 ? CAROM_OK : crm_touches_even(w);
+    if (!full && e >= 0 && w->events.on) full = crm_events_reserve(w);
+    if (full) e = full;
     if (e < 0) {
         restore_state(w);
         crm_forget_guesses(w);

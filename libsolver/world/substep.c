@@ -68,6 +68,16 @@ carom_status crm_substep_create(carom_world *w, crm_substep *s)
     return make_block(w, 0, lay_states, s, &s->state_block, &s->state_bytes);
 }
 
+carom_status crm_substeps_create(carom_world *w)
+{
+    const int columns = w->settings.order / 2;
+    carom_status e = crm_substep_create(w, &w->sub);
+    for (int k = 0; !e && columns > 1 && k < columns * (columns + 1) / 2; k++) {
+        e = crm_substep_create(w, &w->inner[k]);
+    }
+    return e;
+}
+
 carom_status crm_substep_reserve(carom_world *w, crm_substep *s, int n_contacts)
 {
     if (n_contacts <= s->max_contacts) return CAROM_OK;

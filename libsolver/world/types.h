@@ -152,6 +152,8 @@ typedef enum crm_map {
     CRM_MAP_IMPACT,
     CRM_MAP_EXTRAPOLATED /* a combination of chains of smooth ones */
 } crm_map;
+/* Threads that islands are shared among, at most. */
+enum { CRM_MAX_THREADS = 64 };
 enum { CRM_MAX_COLUMNS = 4, CRM_MAX_INNER = 10, CRM_MAX_HOLDS = 4 };
 
 /* Everything about one sub-step: what the reverse pass needs, no more. */
@@ -335,6 +337,10 @@ struct carom_world {
     long revision;          /* counts changes of parameters */
     long n_steps;
     carom_step_stats *stats; /* of the step under way */
+    int n_workers;           /* what threads work with, beyond one: threads.c */
+    carom_world *workers;
+    int max_outcomes;
+    void *outcomes; /* of islands, in their order */
     crm_recorder recorder;
     crm_events events;
 };

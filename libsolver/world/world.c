@@ -29,9 +29,19 @@ static carom_status check_settings(const carom_world_settings *s)
     const int words = s->integrator >= CAROM_EULER && s->integrator <= CAROM_FIXED &&
                       s->combine_friction >= 0 && s->combine_friction <= CAROM_COMBINE_MAX &&
                       s->combine_restitution >= 0 && s->combine_restitution <= CAROM_COMBINE_MAX;
-    return positive && bounded && finite && words && s->max_substeps >= 1 && order
+    return positive && bounded && finite && words && s->max_substeps >= 1 && order &&
+                   s->threads >= 1 && s->threads <= CRM_MAX_THREADS
                ? CAROM_OK
                : CAROM_E_ARGUMENT;
+}
+
+carom_status crm_solver_create(carom_world *w)
+{
+    carom_contact_settings c = carom_contact_defaults();
+    c.accept = w->settings.accept;
+    c.inexact = w->settings.inexact;
+    c.max_restarts = WORLD_RESTARTS;
+    return carom_contact_create(&c, &w->memory.from, &w->solver);
 }
 
 carom_status carom_world_create(const carom_world_settings *settings,
@@ -48,11 +58,7 @@ carom_status carom_world_create(const carom_world_settings *settings,
     if (!w) return CAROM_E_MEMORY;
     w->memory = memory;
     w->settings = chosen;
-    carom_contact_settings c = carom_contact_defaults();
-    c.accept = chosen.accept;
-    c.inexact = chosen.inexact;
-    c.max_restarts = WORLD_RESTARTS;
-    carom_status e = carom_contact_create(&c, allocator, &w->solver);
+    carom_status e = crm_solver_create(w);
     if (!e) e = carom_broadphase_create(allocator, &w->broadphase);
     if (!e) e = crm_reserve_bodies(w);
     if (e) {
@@ -90,6 +96,7 @@ void crm_free_sealed(carom_world *w)
 void carom_world_destroy(carom_world *world)
 {
     if (!world) return;
+    crm_threads_free(world);
     carom_contact_destroy(world->solver);
     carom_broadphase_destroy(world->broadphase);
     crm_free_sealed(world);
@@ -221,7 +228,12 @@ long crm_allocations(const carom_world *w)
     long broadphase;
     carom_contact_memory(w->solver, &bytes, &solver);
     carom_broadphase_memory(w->broadphase, &bytes, &broadphase);
-    return w->memory.n_calls + solver + broadphase;
+    long sum = w->memory.n_calls + solver + broadphase;
+    for (int k = 0; k < w->n_workers; k++) {
+        carom_contact_memory(w->workers[k].solver, &bytes, &solver);
+        sum += w->workers[k].memory.n_calls + solver;
+    }
+    return sum;
 }
 
 carom_world_size carom_world_measure(const carom_world *world)
@@ -252,5 +264,10 @@ carom_world_size carom_world_measure(const carom_world *world)
     carom_broadphase_memory(w->broadphase, &pair_bytes, &calls);
     z.bytes = w->memory.live + solver_bytes + pair_bytes;
     z.bytes_high = w->memory.high + solver_bytes + pair_bytes;
+    for (int k = 0; k < w->n_workers; k++) {
+        carom_contact_memory(w->workers[k].solver, &solver_bytes, &calls);
+        z.bytes += w->workers[k].memory.live + solver_bytes;
+        z.bytes_high += w->workers[k].memory.high + solver_bytes;
+    }
     return z;
 }
