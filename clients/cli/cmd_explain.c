@@ -115,6 +115,33 @@ static void explain_needs(FILE *f, const carom_world_size *z, const carom_step_s
     row(f, "memory", (double)z->bytes, note);
 }
 
+static void plan_row(FILE *f, const char *title, int needed, const char *yes, const char *no)
+{
+    fprintf(f, "  %-18s %10s  %s\n", title, needed ? "yes" : "-", needed ? yes : no);
+}
+
+static void explain_plan(FILE *f, const carom_plan *p)
+{
+    fprintf(f, "\nplan\n");
+    plan_row(f, "contacts", p->contacts, "bodies may meet: pairs are sought in each step",
+             "no two bodies may ever meet: no boxes, no pairs");
+    plan_row(f, "hulls", p->hulls, "shapes with edges may meet",
+             "never two shapes with edges: no search of features, no clipping");
+    plan_row(f, "friction", p->friction, "contacts get tangential rows", "no tangential rows");
+    plan_row(f, "restitution", p->restitution, "contacts or limits bounce",
+             "all impacts are plastic");
+    plan_row(f, "joints", p->joints, "joint rows and their corrections", "no border, no drift");
+    plan_row(f, "limits", p->limits, "joints have limits", "no joint has limits");
+    plan_row(f, "springs, motors", p->drives, "joints have springs or motors", "no such forces");
+    plan_row(f, "contact solver", p->solver, "a problem is solved where something touches or holds",
+             "motion is free: no solve, no matrix");
+    plan_row(f, "located impacts", p->located, "times of impacts are sought",
+             "nothing is sought within a step");
+    plan_row(f, "higher order", p->extrapolated, "sub-steps are extrapolated", "order 2, or 1");
+    plan_row(f, "sensors", p->sensors, "seen by queries alone", "none");
+    plan_row(f, "threads", p->threads, "islands are shared among threads", "one thread");
+}
+
 static void explain_pairs(FILE *f, const pairs *p)
 {
     row(f, "pairs", p->silent, "one of the two has no shape, or collide is false");
@@ -176,11 +203,13 @@ static carom_status dry_steps(const crm_run *run, carom_world *w, carom_step_sta
 static int explain(const crm_arguments *a, const crm_run *run)
 {
     crm_output out;
+    carom_plan plan;
     carom_step_stats stats;
     carom_world_size size;
     double seconds = 0;
     carom_world *w = crm_run_world(run);
     if (!w) return CRM_USAGE;
+    plan = carom_world_plan(w);
     const carom_status s = dry_steps(run, w, &stats, &size, &seconds);
     if (s < 0) {
         fprintf(stderr, "%s: the first step failed: %s: %s %s\n", run->file, carom_status_name(s),
@@ -190,6 +219,7 @@ static int explain(const crm_arguments *a, const crm_run *run)
     if (!crm_output_open(&out, crm_argument(a, "--out"))) return CRM_USAGE;
     fprintf(out.file, "%s\n\nneeds\n", crm_run_name(run));
     explain_needs(out.file, &size, &stats);
+    explain_plan(out.file, &plan);
     explain_left_out(out.file, run, &size, &stats);
     explain_cost(out.file, run, &stats, seconds);
     return crm_output_close(&out) && s >= 0 ? CRM_DONE : CRM_FAILED;

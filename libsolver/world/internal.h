@@ -217,6 +217,9 @@ carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use
  * then without friction, then with as much approach as must be. */
 carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, int plastic);
 
+/* plan.c */
+carom_plan crm_plan(const carom_world *w);
+
 /* step.c: the static bodies of all states that a sub-step works with. */
 void crm_put_statics(carom_world *w);
 

@@ -23,7 +23,7 @@ static void lay(carom_world *w, crm_block *b)
     s->ahead = crm_carve(b, 3 * n, sizeof(double));
     s->slack = crm_carve(b, n, sizeof(double));
     s->excess = crm_carve(b, n, sizeof(double));
-    s->boxes = crm_carve(b, (size_t)w->n_shapes, sizeof *s->boxes);
+    s->boxes = crm_carve(b, w->plan.contacts ? (size_t)w->n_shapes : 0, sizeof *s->boxes);
 }
 
 carom_status crm_islands_create(carom_world *w)
@@ -94,6 +94,8 @@ static carom_status find_pairs(carom_world *w, int *same)
     crm_islands *s = &w->islands;
     int n;
     const carom_pair *pairs;
+    *same = 1;
+    if (!w->plan.contacts) return CAROM_OK;
     for (int k = 0; k < w->n_shapes; k++) {
         if (w->bodies[w->shapes[k].body].sensor) {
             s->boxes[k] = no_box();

@@ -195,7 +195,7 @@ static carom_status clear_overlap(carom_world *w)
     const size_t bytes = 3 * (size_t)w->n_bodies * sizeof(double);
     memcpy(w->q_saved, w->q, bytes);
     memcpy(w->sub.q1, w->q, bytes);
-    for (int k = 0; k < CRM_MAX_SOLVES; k++) memcpy(w->sub.solve[k].q, w->q, bytes);
+    for (int k = 0; k < w->n_solves; k++) memcpy(w->sub.solve[k].q, w->q, bytes);
     const carom_status e = clear_rounds(w, &o);
     if (e < 0) {
         memcpy(w->q, w->q_saved, bytes);
@@ -216,6 +216,8 @@ static carom_status seal(carom_world *w, int as_is)
     set_scales(w);
     count_moving(w);
     count_springs(w);
+    w->plan = crm_plan(w);
+    w->n_solves = w->plan.solver ? CRM_MAX_SOLVES : 2;
     carom_status e = allocate(w);
     if (!e) {
         crm_sort_joined(w);

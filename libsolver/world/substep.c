@@ -32,7 +32,7 @@ static void lay_states(const carom_world *w, int n, crm_block *b, void *object)
     s->q1 = crm_carve(b, n3, sizeof(double));
     s->v1 = crm_carve(b, n3, sizeof(double));
     s->joint_target = crm_carve(b, rows, sizeof(double));
-    for (int k = 0; k < CRM_MAX_SOLVES; k++) {
+    for (int k = 0; k < w->n_solves; k++) {
         crm_solve *c = &s->solve[k];
         c->q = crm_carve(b, n3, sizeof(double));
         c->v = crm_carve(b, n3, sizeof(double));
@@ -70,7 +70,7 @@ carom_status crm_substep_create(carom_world *w, crm_substep *s)
 
 carom_status crm_substeps_create(carom_world *w)
 {
-    const int columns = w->settings.order / 2;
+    const int columns = w->plan.extrapolated ? w->settings.order / 2 : 1;
     carom_status e = crm_substep_create(w, &w->sub);
     for (int k = 0; !e && columns > 1 && k < columns * (columns + 1) / 2; k++) {
         e = crm_substep_create(w, &w->inner[k]);

@@ -48,6 +48,8 @@ static carom_status create_worker(const carom_world *w, carom_world *x)
     x->n_bodies = w->n_bodies;
     x->n_moving = w->n_moving;
     x->n_joint_rows = w->n_joint_rows;
+    x->plan = w->plan;
+    x->n_solves = w->n_solves;
     carom_status e = crm_solver_create(x);
     if (!e) e = crm_rows_create(x);
     if (!e) e = crm_substeps_create(x);

@@ -301,8 +301,10 @@ struct carom_world {
     /* From here on: made by seal. */
     int sealed;
     int n_moving;
-    double length;     /* L [m] */
-    int smooth;        /* 1: two-stage map; 0: Euler */
+    double length; /* L [m] */
+    int smooth;    /* 1: two-stage map; 0: Euler */
+    carom_plan plan;
+    int n_solves;      /* that sub-steps have states for: those of the map, and corrections */
     double speed;      /* sqrt(g L) [m/s] */
     double rest_speed; /* v_rest [m/s] */
     double recovery;   /* errors of position are recovered no faster [m/s] */

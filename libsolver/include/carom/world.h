@@ -247,6 +247,24 @@ typedef struct carom_contact_info {
 CAROM_API int carom_world_n_contacts(const carom_world *world);
 CAROM_API carom_contact_info carom_world_contact(const carom_world *world, int k);
 
+/* What the scene needs; 0: no work and no memory for it. */
+typedef struct carom_plan {
+    int contacts;     /* bodies may meet: pairs are sought, contact points found */
+    int hulls;        /* ... both with edges: nearest features, clipping; libccd for huge ones */
+    int friction;     /* ... with friction: tangential rows */
+    int restitution;  /* contacts or limits that bounce */
+    int joints;       /* joint rows, corrections of position */
+    int limits;       /* of joints: contacts without shapes */
+    int drives;       /* springs and motors */
+    int solver;       /* contact problems are solved: contacts, joint rows or limits */
+    int located;      /* times of impacts are sought */
+    int extrapolated; /* orders above 2: tables of sub-steps */
+    int sensors;      /* shapes that only carom_query_sensors sees */
+    int threads;      /* islands are shared among several */
+} carom_plan;
+/* Of the scene as it is; friction and restitution follow the parameters. */
+CAROM_API carom_plan carom_world_plan(const carom_world *world);
+
 /* Size of what the world holds, for `carom explain`. */
 typedef struct carom_world_size {
     int n_dynamic, n_static, n_kinematic;
