@@ -252,6 +252,7 @@ static void head_on(trial *t, double ratio, double e)
     t->p[0] = ratio;
     t->p[1] = e;
     t->error = exchanged;
+    t->rough = 0.15; /* an impact late by a step */
     t->tolerance = 1e-9;
     t->probe = 1;
 }

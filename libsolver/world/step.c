@@ -129,15 +129,29 @@ static carom_status run_located(carom_world *w, double left, int allowed, int *b
     return crm_locate(w, left, allowed, busy);
 }
 
+/* A sub-step over `share` of the time left, which knew of no more than that. */
+static void end_early(carom_world *w, double share)
+{
+    crm_substep *s = &w->sub;
+    if (!(share < 1)) return;
+    if (s->end == CRM_END_FRACTION) s->fraction *= share;
+    if (s->end != CRM_END_FRAME) return;
+    s->end = CRM_END_FRACTION;
+    s->fraction = share;
+    w->n_stiff++;
+}
+
 static carom_status substep(carom_world *w, double *left, int last)
 {
-    const int allowed = substeps_allowed(w) - w->n_substeps - 1;
+    const double span = last ? *left : crm_stiff_span(w, *left);
+    const int allowed = substeps_allowed(w) + w->n_stiff - w->n_substeps - 1;
     int busy = last || allowed <= 0 || w->effort >= CRM_WORN;
     const double since = fmax(w->settings.dt - *left, 0);
     begin_substep(w);
-    carom_status e = busy ? CAROM_OK : run_located(w, *left, allowed, &busy);
-    if (e >= 0 && busy) e = run_last(w, *left);
+    carom_status e = busy ? CAROM_OK : run_located(w, span, allowed, &busy);
+    if (e >= 0 && busy) e = run_last(w, span);
     if (e < 0) return e;
+    end_early(w, span / *left);
     if (e > w->stats->status) w->stats->status = e;
     *left = w->sub.end == CRM_END_FRAME ? 0 : *left - w->sub.h;
     e = commit(w);
@@ -171,11 +185,13 @@ static carom_status advance_island(carom_world *w, const crm_island *island)
     crm_enter(w, island);
     w->n_substeps = 0;
     w->n_impacts = 0;
+    w->n_stiff = 0;
     w->effort = 0;
     w->first_touch = w->next.n;
     for (int k = 0; left > CARRY_TOL * dt; k++) {
-        if (k >= 2 * MAX_SUBSTEPS) return CAROM_E_NO_SOLUTION;
-        const carom_status e = substep(w, &left, k >= MAX_SUBSTEPS);
+        const int n = k - w->n_stiff;
+        if (n >= 2 * MAX_SUBSTEPS) return CAROM_E_NO_SOLUTION;
+        const carom_status e = substep(w, &left, n >= MAX_SUBSTEPS);
         if (e < 0) return e;
     }
     finish_island(w, left);

@@ -330,6 +330,7 @@ struct carom_world {
     const crm_island *island; /* under way */
     int n_substeps;           /* of the island in this frame */
     int n_impacts;            /* of the island since time last passed */
+    int n_stiff;              /* sub-steps of the island that ended for stiff joints alone */
     int effort;               /* factorizations of the island in this frame */
     crm_touches touches, next;
     int first_touch;        /* of the island, in next */
