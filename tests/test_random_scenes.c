@@ -201,7 +201,7 @@ static void check_tally(const char *name, const tally *t, const carom_world_sett
     assert_at_most(name, (double)t->stuck, ceil(STUCK_SHARE * (double)t->scenes));
     assert_at_most(name, t->busiest.value, MOST_FACTORIZATIONS);
     /* each of the frames that are run again has its own */
-    assert_at_most(name, t->substeps.value, 2 * set->max_substeps);
+    assert_at_most(name, t->substeps.value, 2 * (set->max_substeps + set->max_stiff));
     assert_at_most(name, t->residual.value, set->inexact);
     assert_at_most(name, t->overlap.value, DEEPEST);
     assert_at_most(name, t->unsaid.value, LOOSE_JOINT);

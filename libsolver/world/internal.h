@@ -253,6 +253,8 @@ double crm_rounding(const carom_world *w);
 /* Modes and impulses of the first two solves of sub, of length h, from the last accepted sub-step
  * of the island. */
 void crm_guess_load(carom_world *w, double h);
+/* Forces of joints over the sub-step just run, into joint_total; an impact leaves them. */
+void crm_joint_totals(carom_world *w);
 /* Contacts of sub as the island's touches. */
 carom_status crm_touches_save(carom_world *w);
 /* Room for n touches of the frame under way. */

@@ -289,6 +289,20 @@ carom_status crm_touches_even(carom_world *w)
     return reserve(w, &w->touches, w->next.n);
 }
 
+void crm_joint_totals(carom_world *w)
+{
+    const crm_substep *s = &w->sub;
+    const crm_solve *x = s->solve;
+    int row = 0;
+    if (!(s->h > 0)) return;
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        for (int r = j->first_row; r < j->first_row + j->n_rows; r++, row++) {
+            w->joint_total[r] = whole(s, x[0].le[row], x[1].le[row]) / s->h;
+        }
+    }
+}
+
 static void save_joint_forces(carom_world *w)
 {
     const crm_substep *s = &w->sub;
@@ -298,7 +312,6 @@ static void save_joint_forces(carom_world *w)
         const crm_joint *j = &w->joints[w->island->joints[k]];
         for (int r = j->first_row; r < j->first_row + j->n_rows; r++, row++) {
             for (int i = 0; i < 2; i++) w->joint_force[i][r] = per_time(s, i) * x[i].le[row];
-            if (s->h > 0) w->joint_total[r] = whole(s, x[0].le[row], x[1].le[row]) / s->h;
         }
     }
 }
@@ -320,6 +333,7 @@ void crm_forget_guesses(carom_world *w)
     const size_t bytes = (size_t)w->n_joint_rows * sizeof(double);
     w->touches.n = 0;
     for (int i = 0; i < 2 && w->joint_force[i]; i++) memset(w->joint_force[i], 0, bytes);
+    if (w->joint_total) memset(w->joint_total, 0, bytes);
 }
 
 /* By shape pair; contacts of one pair keep their order, for they are next to each other. */

@@ -141,15 +141,39 @@ static void end_early(carom_world *w, double share)
     w->n_stiff++;
 }
 
-static carom_status substep(carom_world *w, double *left, int last)
+/* Over `span` of the time left; its joint forces are known then. */
+static carom_status try_substep(carom_world *w, double span, int last)
 {
-    const double span = last ? *left : crm_stiff_span(w, *left);
     const int allowed = substeps_allowed(w) + w->n_stiff - w->n_substeps - 1;
     int busy = last || allowed <= 0 || w->effort >= CRM_WORN;
-    const double since = fmax(w->settings.dt - *left, 0);
     begin_substep(w);
     carom_status e = busy ? CAROM_OK : run_located(w, span, allowed, &busy);
     if (e >= 0 && busy) e = run_last(w, span);
+    if (e >= 0) crm_joint_totals(w);
+    return e;
+}
+
+/* Joints that turn out too stiff for the span are given a shorter one. */
+static carom_status run_stable(carom_world *w, double left, int last, double *span)
+{
+    const carom_status before = w->stats->status;
+    *span = last ? left : crm_stiff_span(w, left);
+    carom_status e = try_substep(w, *span, last);
+    while (e >= 0 && !last) {
+        const double next = crm_stiff_span(w, left);
+        if (!(next < 0.75 * fmin(*span, w->sub.h))) break;
+        w->stats->status = before;
+        *span = next;
+        e = try_substep(w, next, last);
+    }
+    return e;
+}
+
+static carom_status substep(carom_world *w, double *left, int last)
+{
+    const double since = fmax(w->settings.dt - *left, 0);
+    double span;
+    carom_status e = run_stable(w, *left, last, &span);
     if (e < 0) return e;
     end_early(w, span / *left);
     if (e > w->stats->status) w->stats->status = e;
@@ -186,6 +210,7 @@ static carom_status advance_island(carom_world *w, const crm_island *island)
     w->n_substeps = 0;
     w->n_impacts = 0;
     w->n_stiff = 0;
+    w->n_parts = 0;
     w->effort = 0;
     w->first_touch = w->next.n;
     for (int k = 0; left > CARRY_TOL * dt; k++) {

@@ -5,11 +5,9 @@
 #include <math.h>
 
 /* S(h) takes the directions of joints at its ends: explicit in their turn, and so stable for
- * h w < 2, with w the frequency at which a force turns the body it pulls at. */
+ * h w < 2, with w the frequency at which a force turns the body it pulls at.  The estimate below is
+ * about twice that of a chain's links. */
 static const double MOST_TURN = 2;
-/* Such sub-steps of an island in one frame [max_substeps]: they need no search and few
- * factorizations, where too long ones fail at length. */
-enum { AS_MANY = 8 };
 
 static double inverse(const carom_world *w, const double *of, int body)
 {
@@ -40,17 +38,27 @@ static double stiffness_of(const carom_world *w, const crm_joint *j)
            swing * m;
 }
 
-double crm_stiff_span(carom_world *w, double left)
+/* Sub-steps of a frame that the forces of joints ask for [1]. */
+static double asked(const carom_world *w)
 {
     double square = 0;
-    if (w->settings.integrator == CAROM_FIXED) return left;
     for (int k = 0; k < w->island->n_joints; k++) {
         square = fmax(square, stiffness_of(w, &w->joints[w->island->joints[k]]));
     }
     /* Most bodies have two joints. */
-    const double n = ceil(left * sqrt(2 * square) / MOST_TURN);
-    const double allowed = AS_MANY * w->settings.max_substeps - w->n_stiff;
-    if (n <= 1) return left;
-    if (n > allowed && w->stats->status < CAROM_LIMIT) w->stats->status = CAROM_LIMIT;
-    return left / fmax(1, fmin(n, allowed));
+    return w->settings.dt * sqrt(2 * square) / MOST_TURN;
+}
+
+/* A number that followed each change of a force would make the motion jump with it: a power of two,
+ * that only grows while the frame lasts. */
+double crm_stiff_span(carom_world *w, double left)
+{
+    if (w->settings.integrator == CAROM_FIXED || !w->island->n_joints) return left;
+    const double n = asked(w);
+    if (n > w->n_parts) {
+        if (!w->n_parts) w->n_parts = 1;
+        while (w->n_parts < n && 2 * w->n_parts <= w->settings.max_stiff) w->n_parts *= 2;
+        if (w->n_parts < n && w->stats->status < CAROM_LIMIT) w->stats->status = CAROM_LIMIT;
+    }
+    return left / fmax(1, ceil(left / w->settings.dt * w->n_parts - CRM_NO_TIME));
 }

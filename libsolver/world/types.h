@@ -331,6 +331,7 @@ struct carom_world {
     int n_substeps;           /* of the island in this frame */
     int n_impacts;            /* of the island since time last passed */
     int n_stiff;              /* sub-steps of the island that ended for stiff joints alone */
+    int n_parts;              /* into which stiff joints divide its frame; 0: not known yet */
     int effort;               /* factorizations of the island in this frame */
     crm_touches touches, next;
     int first_touch;        /* of the island, in next */

@@ -30,7 +30,7 @@ static carom_status check_settings(const carom_world_settings *s)
                       s->combine_friction >= 0 && s->combine_friction <= CAROM_COMBINE_MAX &&
                       s->combine_restitution >= 0 && s->combine_restitution <= CAROM_COMBINE_MAX;
     return positive && bounded && finite && words && s->max_substeps >= 1 && order &&
-                   s->threads >= 1 && s->threads <= CRM_MAX_THREADS
+                   s->max_stiff >= 1 && s->threads >= 1 && s->threads <= CRM_MAX_THREADS
                ? CAROM_OK
                : CAROM_E_ARGUMENT;
 }

@@ -120,7 +120,27 @@ static carom_world *uneven_chain(const gradient_scene *s)
         before = b;
     }
     for (int b = 1; b < carom_world_n_bodies(w); b++) w->bodies[b].filter.group = -1;
+    /* A perturbation that changes the number of sub-steps jumps: see heavy_end. */
+    w->settings.max_stiff = 1;
     scene_push(w, 3, 0, 2, -2);
+    return w;
+}
+
+/* Light links under a heavy one: stiff joints divide each step into 4. */
+static carom_world *heavy_end(const gradient_scene *s)
+{
+    (void)s;
+    carom_world *w = scene_world(9.81, 1.0 / 60);
+    int before = scene_anchor(w);
+    for (int k = 0; k < 3; k++) {
+        const double x = k * cos(0.3);
+        const double y = -k * sin(0.3);
+        const carom_pose mid = at(x + 0.5 * cos(0.3), y - 0.5 * sin(0.3), -0.3);
+        const int b = scene_box(w, k < 2 ? 0.1 : 30, 0.5, 0.05, mid, 0, 0);
+        const carom_vec2 pin = {x, y};
+        assert_int_equal(carom_world_add_revolute(w, before, b, pin, NULL), CAROM_OK);
+        before = b;
+    }
     return w;
 }
 
@@ -218,6 +238,7 @@ const gradient_scene gradient_scenes[] = {
     {"two discs", two_discs, 40, STEP, 0},
     {"chain of ten", chain, 15, STEP, 0},
     {"uneven chain", uneven_chain, 20, 1e-6, 0},
+    {"heavy end", heavy_end, 10, 1e-6, 0},
     {"pushed stack", pushed_stack, 20, STEP_OF_FACES, 0},
     {"tumbling box", tumbling_box, 30, STEP, 0},
     {"double pendulum", pendulum, 40, STEP, 0},

@@ -46,6 +46,7 @@ typedef enum carom_combine {
     X(rest_speed, double, 1e-3, "sqrt(g L)", "approach slower than this does not bounce")          \
     X(max_substeps, int, 32, "1", "sub-steps of an island, at most; 128/bodies in large ones")     \
     X(threads, int, 1, "1", "among which islands are shared, 1 to 64: the same bits")              \
+    X(max_stiff, int, 256, "1", "sub-steps that stiff joints ask for, at most; 1: none")           \
     X(project_overlap, int, 1, "", "overlap of the initial scene: 1 projected away, 0 refused")    \
     X(accept, double, 1e-10, "1", "residual of a solved contact problem")                          \
     X(inexact, double, 1e-6, "1", "residual of a usable one")
