@@ -5,9 +5,10 @@
 #include <math.h>
 
 /* S(h) takes the directions of joints at its ends: explicit in their turn, and so stable for
- * h w < 2, with w the frequency at which a force turns the body it pulls at.  The estimate below is
- * about twice that of a chain's links. */
+ * h w < 2, with w the frequency at which a force turns the body it pulls at.  An extrapolated map,
+ * whose other columns are finer, may go on where its first one is at that limit. */
 static const double MOST_TURN = 2;
+static const double MOST_TURN_EXTRAPOLATED = 3;
 
 static double inverse(const carom_world *w, const double *of, int body)
 {
@@ -46,7 +47,8 @@ static double asked(const carom_world *w)
         square = fmax(square, stiffness_of(w, &w->joints[w->island->joints[k]]));
     }
     /* Most bodies have two joints. */
-    return w->settings.dt * sqrt(2 * square) / MOST_TURN;
+    const double most = w->settings.order > 2 ? MOST_TURN_EXTRAPOLATED : MOST_TURN;
+    return w->settings.dt * sqrt(2 * square) / most;
 }
 
 /* A number that followed each change of a force would make the motion jump with it: a power of two,
