@@ -120,11 +120,19 @@ static double dot_island(const carom_world *w, const double *x, const double *y)
     return sum;
 }
 
+/* Adds the cotangents of -scale g0, where the event is the return to the gap g0 at q0. */
+static void event_start_vjp(crm_reverse *r, const crm_substep *s, double scale)
+{
+    if (s->end != CRM_END_EVENT || !s->returns || scale == 0) return;
+    const carom_contact_bar bar = {{0, 0}, {0, 0}, {0, 0}, -scale};
+    crm_geometry_vjp(r, s->q0, &s->event, &bar, r->q_bar);
+}
+
 /* The sub-step ended at the root h* of g: dh* = -(dg/dtheta) / (dg/dh).  With H = h_bar - left_bar,
  * the cotangent of h*, every derivative of g enters with k = -H / (dg/dh): the seeds k dg/dq1 and
  * k dg/dv1 are added to q_bar and v_bar, and k dg/dparameter to the sink.  What h does to (q1, v1)
- * is found forward: it gives h_bar and dg/dh. */
-static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar)
+ * is found forward: it gives h_bar and dg/dh.  *k stays where the time has no usable derivative. */
+static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar, double *k)
 {
     const carom_world *w = r->world;
     crm_forward *f = &r->clockwork;
@@ -141,7 +149,8 @@ static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar)
         r->stats.degenerate++;
         return CAROM_OK;
     }
-    event_vjp(r, s, -(h_bar - left_bar) / slope);
+    *k = -(h_bar - left_bar) / slope;
+    event_vjp(r, s, *k);
     return CAROM_OK;
 }
 
@@ -150,16 +159,18 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
 {
     crm_substep *s = &r->work.s;
     double h_bar;
+    double k = 0;
     r->record = record;
     crm_unpack(r->world, &r->tape->records[record], r->moved, &r->work);
     crm_copy(r->world, s->q1, r->q_after);
     crm_copy(r->world, s->v1, r->v_after);
     if (s->end == CRM_END_EVENT || s->end == CRM_END_STOP) {
-        const carom_status e = locate_vjp(r, s, *left_bar);
+        const carom_status e = locate_vjp(r, s, *left_bar, &k);
         if (e < 0) return e;
     }
     const carom_status e = crm_substep_vjp(r, s, r->q_bar, r->v_bar, &h_bar);
     if (e < 0) return e;
+    event_start_vjp(r, s, k);
     drop_negligible(r->world, r->q_bar, r->scale);
     drop_negligible(r->world, r->v_bar, r->scale);
     crm_copy(r->world, r->q_after, s->q0);

@@ -58,6 +58,14 @@ static carom_status allocate(crm_forward *f)
     return CAROM_OK;
 }
 
+/* Change of the gap at q0, where the event is the return to it. */
+static double start_jvp(const crm_forward *f, const crm_substep *s, const crm_line *line)
+{
+    if (!s->returns) return 0;
+    const double *q_dot = s->map == CRM_MAP_EXTRAPOLATED ? line->start_q : line->q0;
+    return crm_geometry_jvp(f->world, s->q0, &s->event, q_dot, line->by).gap;
+}
+
 double crm_event_jvp(const crm_forward *f, const crm_substep *s, const crm_line *line)
 {
     const crm_contact *c = &s->event;
@@ -65,7 +73,7 @@ double crm_event_jvp(const crm_forward *f, const crm_substep *s, const crm_line 
     double jn[6];
     double jt[6];
     double jt_dot[6];
-    if (s->end != CRM_END_STOP) return dot.gap;
+    if (s->end != CRM_END_STOP) return dot.gap - start_jvp(f, s, line);
     crm_contact_rows(c, jn, jt);
     crm_contact_rows_jvp(c, &dot, jn, jt_dot);
     return crm_row_dot(jt, line->v, c->body_a, c->body_b) +

@@ -322,6 +322,7 @@ static int set_event(carom_world *w, const watch *x)
 {
     crm_substep *s = &w->sub;
     s->end = CRM_END_EVENT;
+    s->returns = x->opened && x->base < -(CRM_HIT_TOL * w->length + crm_rounding(w));
     if (x->limit) {
         s->event = crm_limit_at(w, x->limit, s->q1);
         return 1;

@@ -186,6 +186,7 @@ typedef struct crm_substep {
     crm_end end;
     double fraction;
     crm_contact event; /* the contact that closes at q1 */
+    int returns;       /* 1: ... when it overlaps as much again as at q0, where it was opening */
     void *state_block; /* one block each: states; contacts */
     size_t state_bytes;
     void *contact_block;
