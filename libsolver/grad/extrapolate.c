@@ -5,9 +5,10 @@
 static carom_status hold_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, double *q_bar,
                              double *q0_bar)
 {
+    double none = 0;
     const carom_status e = crm_solve_vjp(r, s, c, q_bar);
     if (e < 0) return e;
-    crm_mass_vjp(r);
+    crm_mass_vjp(r, s, c, &none);
     for (int k = 0; k < s->n_contacts; k++) {
         if (!(r->world->rows.mu[k] > 0)) continue; /* crm_hold_problem has chosen */
         crm_slip_vjp(r, &s->moved[k], s->q0, c->q, r->bars.ct[k], q0_bar, q_bar);
@@ -20,9 +21,10 @@ static carom_status hold_speed_vjp(crm_reverse *r, crm_substep *s, const crm_sol
                                    double *q_bar, double *v_bar)
 {
     const crm_island *island = r->world->island;
+    double none = 0;
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
-    crm_mass_vjp(r);
+    crm_mass_vjp(r, s, c, &none);
     for (int i = 0; i < island->n_bodies; i++) {
         memcpy(&v_bar[3 * island->bodies[i]], &r->bars.u[3 * i], 3 * sizeof *v_bar);
     }

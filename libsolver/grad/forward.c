@@ -26,6 +26,31 @@ static void masses_jvp(crm_forward *f, const carom_gradient *by)
     }
 }
 
+/* Of number k of a body's velocity. */
+static double damping_dot(const carom_world *w, const carom_gradient *by, int body, int k)
+{
+    if (!crm_is_damped(w, body, k)) return 0;
+    return crm_entry(k ? by->linear_damping : by->angular_damping, body);
+}
+
+/* W = mean / m. */
+static void damped_masses_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c,
+                              const crm_line *line)
+{
+    const carom_world *w = f->world;
+    const double share = crm_share(c);
+    const double h = share * s->h;
+    for (int i = 0; i < 3 * w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i / 3];
+        const double damping = w->bodies[b].damping[i % 3 > 0];
+        if (w->bodies[b].type != CAROM_DYNAMIC) continue;
+        const crm_decay d = crm_decay_in(damping, h);
+        const double W = 1 / (i % 3 ? w->mass[b] : w->inertia[b]);
+        const double x_dot = damping_dot(w, line->by, b, i % 3) * h + damping * share * line->h;
+        f->dot.inv_mass[i] = d.mean * f->dot.inv_mass[i] + W * d.slope * x_dot;
+    }
+}
+
 /* Of a combined coefficient. */
 static double combined(int rule, const double *x, const double *x_dot, int a, int b)
 {
@@ -91,6 +116,7 @@ void crm_rows_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, cons
     const carom_world *w = f->world;
     const int rough = c->kind != CRM_CORRECTION && !s->slick;
     masses_jvp(f, line->by);
+    if (f->world->damped) damped_masses_jvp(f, s, c, line);
     memset(f->dot.u, 0, 3 * (size_t)w->island->n_bodies * sizeof(double));
     for (int k = 0; k < s->n_contacts; k++) {
         const crm_contact *x = &s->moved[k];
@@ -103,25 +129,51 @@ void crm_rows_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, cons
     joint_rows_jvp(f, c, line);
 }
 
-void crm_free_velocity_jvp(crm_forward *f, const crm_substep *s, const crm_line *line,
-                           const double *v_dot, double h, double share)
+static double gravity_jvp(const carom_world *w, const carom_gradient *by, int body, int k)
+{
+    if (w->bodies[body].type != CAROM_DYNAMIC || k == 0) return 0;
+    return w->bodies[body].gravity_scale * crm_entry(by->gravity, k - 1) +
+           w->settings.gravity[k - 1] * crm_entry(by->gravity_scale, body);
+}
+
+/* Of keep v + h mean g, what damping makes of number i of the island, but for v_dot. */
+static double damped_jvp(const carom_world *w, const crm_substep *s, const crm_solve *c, int i,
+                         const crm_line *line)
+{
+    const int b = w->island->bodies[i / 3];
+    const int at = 3 * b + i % 3;
+    const double share = crm_share(c);
+    const double h = share * s->h;
+    const double damping = w->bodies[b].damping[i % 3 > 0];
+    const crm_decay d = crm_decay_in(damping, h);
+    const double g = crm_gravity(w, b, i % 3);
+    const double v = c->kind == CRM_STAGE_2 ? c[-1].v[at] : s->v0[at];
+    return share * line->h * d.keep * (g - damping * v) +
+           damping_dot(w, line->by, b, i % 3) * h * (h * d.slope * g - d.keep * v) +
+           h * d.mean * gravity_jvp(w, line->by, b, i % 3);
+}
+
+void crm_free_velocity_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c,
+                           const crm_line *line, const double *v_dot)
 {
     const carom_world *w = f->world;
     const carom_gradient *by = line->by;
+    const double share = crm_share(c);
+    const double h = share * s->h;
     const double *steps = by->force_steps;
     if (steps) steps += 3 * (size_t)w->n_bodies * (size_t)(f->frame - f->from);
-    for (int i = 0; i < w->island->n_bodies; i++) {
-        const int b = w->island->bodies[i];
-        const int falls = w->bodies[b].type == CAROM_DYNAMIC;
-        for (int k = 0; k < 3; k++) {
-            const int at = 3 * b + k;
-            const double W = w->rows.inv_mass[3 * i + k];
-            const double g = falls && k > 0 ? w->settings.gravity[k - 1] : 0;
-            const double g_dot = falls && k > 0 ? crm_entry(by->gravity, k - 1) : 0;
-            const double f_dot = crm_entry(by->force, at) + crm_entry(steps, at);
-            const double a_dot = f->dot.inv_mass[3 * i + k] * s->force[at] + W * f_dot + g_dot;
-            f->dot.u[3 * i + k] += v_dot[at] + share * line->h * (W * s->force[at] + g) + h * a_dot;
-        }
+    for (int i = 0; i < 3 * w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i / 3];
+        const int at = 3 * b + i % 3;
+        const double W = w->rows.inv_mass[i];
+        const double f_dot = crm_entry(by->force, at) + crm_entry(steps, at);
+        const crm_decay d = crm_decay_in(w->bodies[b].damping[i % 3 > 0], w->damped ? h : 0);
+        double *u_dot = &f->dot.u[i];
+        *u_dot += d.keep * v_dot[at] + share * line->h * W * s->force[at] +
+                  h * (f->dot.inv_mass[i] * s->force[at] + W * f_dot);
+        *u_dot += w->damped ? damped_jvp(w, s, c, i, line)
+                            : share * line->h * crm_gravity(w, b, i % 3) +
+                                  h * gravity_jvp(w, by, b, i % 3);
     }
 }
 
@@ -206,14 +258,13 @@ carom_status crm_correction_jvp(crm_forward *f, crm_substep *s, const crm_solve 
 static carom_status velocity_jvp(crm_forward *f, crm_substep *s, int n)
 {
     const crm_solve *c = &s->solve[0];
-    const double share = c->kind == CRM_IMPACT ? 0 : 1;
     crm_begin_solve(f, s, c);
     for (int i = 0; i < n; i++) {
         crm_line *line = &f->lines[i];
         crm_copy(f->world, line->v0, line->v);
         crm_rows_jvp(f, s, c, line);
-        crm_free_velocity_jvp(f, s, line, line->v0, share * s->h, share);
-        if (share > 0) crm_drive_jvp(f, s, c, line);
+        crm_free_velocity_jvp(f, s, c, line, line->v0);
+        if (crm_share(c) > 0) crm_drive_jvp(f, s, c, line);
         crm_targets_jvp(f, s, line);
         const carom_status e = crm_solve_jvp(f, line->v);
         if (e < 0) return e;

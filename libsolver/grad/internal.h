@@ -67,7 +67,7 @@ void crm_free_checkpoints(carom_tape *t);
 
 /* shared.c: the arrays of a gradient one by one: where array k is, NULL when not wanted, and how
  * many numbers it has for so many steps. */
-enum { CRM_N_ARRAYS = 23 };
+enum { CRM_N_ARRAYS = 26 };
 double *crm_array(const carom_gradient *g, int k);
 void crm_set_array(carom_gradient *g, int k, double *p);
 size_t crm_array_size(const carom_world *w, int n_frames, int k);
@@ -258,15 +258,16 @@ carom_status crm_sides_vjp(crm_reverse *r, const double *v_bar, double tol);
 carom_status crm_rest_vjp(crm_reverse *r);
 /* All of it. */
 carom_status crm_solve_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, const double *v_bar);
-/* u = v + h (W f + g): u_bar to v_bar, h_bar (times share = dh / dstep), forces, gravity, masses.
- */
-void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, double h, double share,
-                           double *v_bar, double *h_bar);
+/* u = v + h (W f + g) of a solve, h its share of the sub-step: u_bar to v_bar, h_bar, forces,
+ * gravity, masses, damping. */
+void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *v_bar,
+                           double *h_bar);
 /* q1 = q0 + h v: v_bar += h q_bar, *h_bar += q_bar . v. */
 void crm_move_vjp(const carom_world *w, const crm_substep *s, const double *v, const double *q_bar,
                   double *v_bar, double *h_bar);
-/* Inverse masses in r->bars to mass and inertia. */
-void crm_mass_vjp(crm_reverse *r);
+/* Inverse masses in r->bars, as damping has left them in solve c, to mass and inertia, damping and
+ * h_bar. */
+void crm_mass_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *h_bar);
 /* Rows in r->bars, and gaps and joint errors when given, at q of solve c, to q_bar and parameters.
  */
 void crm_rows_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, const double *gap_bar,
@@ -332,9 +333,9 @@ void crm_begin_solve(crm_forward *f, crm_substep *s, const crm_solve *c);
 /* Changes of rows, gaps, errors, friction and inverse masses of that problem, at c->q moved by
  * line->q; right-hand sides do not change, and u by its first friction alone. */
 void crm_rows_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, const crm_line *line);
-/* dot.u += change of v + h (W f + g), v_dot that of v; share = dh / dstep. */
-void crm_free_velocity_jvp(crm_forward *f, const crm_substep *s, const crm_line *line,
-                           const double *v_dot, double h, double share);
+/* dot.u += change of v + h (W f + g), v_dot that of v. */
+void crm_free_velocity_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c,
+                           const crm_line *line, const double *v_dot);
 /* Of c_n = e u_n, or gap / h ahead. */
 void crm_targets_jvp(crm_forward *f, const crm_substep *s, const crm_line *line);
 /* Change of the solution along dot, of the island, to v_dot. */

@@ -44,12 +44,39 @@ carom_status crm_solve_vjp(crm_reverse *r, crm_substep *s, const crm_solve *c, c
     return e < 0 ? e : crm_rest_vjp(r);
 }
 
+/* Of number k of a body's velocity. */
+static void give_damping(const crm_reverse *r, int body, int k, double d_bar)
+{
+    double *g = k ? r->sink.g.linear_damping : r->sink.g.angular_damping;
+    if (g && crm_is_damped(r->world, body, k)) g[body] += d_bar;
+}
+
+/* W = mean / m: mean_bar = W_bar / m to h and damping; W_bar becomes that of 1 / m. */
+static void damped_mass_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *h_bar)
+{
+    const carom_world *w = r->world;
+    const double share = crm_share(c);
+    const double h = share * s->h;
+    for (int i = 0; i < 3 * w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i / 3];
+        const double d = w->bodies[b].damping[i % 3 > 0];
+        if (w->bodies[b].type != CAROM_DYNAMIC) continue;
+        const crm_decay x = crm_decay_in(d, h);
+        const double W = 1 / (i % 3 ? w->mass[b] : w->inertia[b]);
+        const double x_bar = r->bars.inv_mass[i] * W * x.slope;
+        *h_bar += share * x_bar * d;
+        r->bars.inv_mass[i] *= x.mean;
+        give_damping(r, b, i % 3, x_bar * h);
+    }
+}
+
 /* W = 1 / m: m_bar = -W_bar / m^2. */
-void crm_mass_vjp(crm_reverse *r)
+void crm_mass_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *h_bar)
 {
     const carom_world *w = r->world;
     const carom_gradient *g = &r->sink.g;
     const double *W_bar = r->bars.inv_mass;
+    if (w->damped) damped_mass_vjp(r, s, c, h_bar);
     if (!g->mass && !g->inertia) return;
     for (int i = 0; i < w->island->n_bodies; i++) {
         const int b = w->island->bodies[i];
@@ -60,25 +87,57 @@ void crm_mass_vjp(crm_reverse *r)
     }
 }
 
-void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, double h, double share,
-                           double *v_bar, double *h_bar)
+/* keep v + h mean g of number i of the island, what damping makes of it; h mean = (1 - keep) / d.
+ */
+static void damped_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, int i,
+                       double *h_bar)
+{
+    const carom_world *w = r->world;
+    const int b = w->island->bodies[i / 3];
+    const double u_bar = r->bars.u[i];
+    const double share = crm_share(c);
+    const double h = share * s->h;
+    const double damping = w->bodies[b].damping[i % 3 > 0];
+    const crm_decay d = crm_decay_in(damping, h);
+    const double g = crm_gravity(w, b, i % 3);
+    const double v = c->kind == CRM_STAGE_2 ? c[-1].v[3 * b + i % 3] : s->v0[3 * b + i % 3];
+    *h_bar += share * u_bar * d.keep * (g - damping * v);
+    give_damping(r, b, i % 3, u_bar * h * (h * d.slope * g - d.keep * v));
+}
+
+static void gravity_vjp(const crm_reverse *r, int body, int k, double g_bar)
 {
     const carom_world *w = r->world;
     const carom_gradient *g = &r->sink.g;
-    for (int i = 0; i < w->island->n_bodies; i++) {
-        const int b = w->island->bodies[i];
-        for (int k = 0; k < 3; k++) {
-            const double W = w->rows.inv_mass[3 * i + k];
-            const double u_bar = r->bars.u[3 * i + k];
-            const int falls = w->bodies[b].type == CAROM_DYNAMIC && k > 0;
-            const double gravity = falls ? w->settings.gravity[k - 1] : 0;
-            v_bar[3 * b + k] += u_bar;
-            *h_bar += share * u_bar * (W * s->force[3 * b + k] + gravity);
-            r->bars.inv_mass[3 * i + k] += h * u_bar * s->force[3 * b + k];
-            if (g->force) g->force[3 * b + k] += h * W * u_bar;
-            if (r->sink.force_step) r->sink.force_step[3 * b + k] += h * W * u_bar;
-            if (g->gravity && falls) g->gravity[k - 1] += h * u_bar;
+    if (w->bodies[body].type != CAROM_DYNAMIC || k == 0) return;
+    if (g->gravity) g->gravity[k - 1] += w->bodies[body].gravity_scale * g_bar;
+    if (g->gravity_scale) g->gravity_scale[body] += w->settings.gravity[k - 1] * g_bar;
+}
+
+void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *v_bar,
+                           double *h_bar)
+{
+    const carom_world *w = r->world;
+    const carom_gradient *g = &r->sink.g;
+    const double share = crm_share(c);
+    const double h = share * s->h;
+    for (int i = 0; i < 3 * w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i / 3];
+        const int at = 3 * b + i % 3;
+        const double W = w->rows.inv_mass[i];
+        const double u_bar = r->bars.u[i];
+        const crm_decay d = crm_decay_in(w->bodies[b].damping[i % 3 > 0], w->damped ? h : 0);
+        v_bar[at] += d.keep * u_bar;
+        *h_bar += share * u_bar * W * s->force[at];
+        r->bars.inv_mass[i] += h * u_bar * s->force[at];
+        if (w->damped) {
+            damped_vjp(r, s, c, i, h_bar);
+        } else {
+            *h_bar += share * u_bar * crm_gravity(w, b, i % 3);
         }
+        if (g->force) g->force[at] += h * W * u_bar;
+        if (r->sink.force_step) r->sink.force_step[at] += h * W * u_bar;
+        gravity_vjp(r, b, i % 3, h * d.mean * u_bar);
     }
 }
 
@@ -189,9 +248,10 @@ carom_status crm_correction_vjp(crm_reverse *r, crm_substep *s, const crm_solve 
         const int k = 3 * island->bodies[i / 3] + i % 3;
         r->pose_bar[k] = c->share * q_bar[k];
     }
+    double none = 0;
     const carom_status e = crm_solve_vjp(r, s, c, r->pose_bar);
     if (e < 0) return e;
-    crm_mass_vjp(r);
+    crm_mass_vjp(r, s, c, &none);
     crm_rows_vjp(r, s, c, r->bars.cn, r->bars.ce, q_bar);
     return CAROM_OK;
 }
@@ -221,9 +281,9 @@ carom_status crm_euler_vjp(crm_reverse *r, crm_substep *s, double *q_bar, double
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
     crm_zero(r->world, v_bar);
-    crm_free_velocity_vjp(r, s, s->h, 1, v_bar, h_bar);
+    crm_free_velocity_vjp(r, s, c, v_bar, h_bar);
     crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar);
-    crm_mass_vjp(r);
+    crm_mass_vjp(r, s, c, h_bar);
     crm_targets_vjp(r, s, s->v0, v_bar, r->gap_bar, h_bar);
     crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar);
     return CAROM_OK;
@@ -236,8 +296,8 @@ carom_status crm_impact_vjp(crm_reverse *r, crm_substep *s, double *q_bar, doubl
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
     crm_zero(r->world, v_bar);
-    crm_free_velocity_vjp(r, s, 0, 0, v_bar, &none);
-    crm_mass_vjp(r);
+    crm_free_velocity_vjp(r, s, c, v_bar, &none);
+    crm_mass_vjp(r, s, c, &none);
     crm_targets_vjp(r, s, s->v0, v_bar, r->gap_bar, &none);
     crm_rows_vjp(r, s, c, NULL, NULL, q_bar);
     return CAROM_OK;

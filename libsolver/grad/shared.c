@@ -87,7 +87,9 @@ double crm_border_acceleration(const carom_tape *t, int step, int k)
     const int b = k / 3;
     if (step == 0 || w->bodies[b].type != CAROM_DYNAMIC) return 0;
     const double f = t->frames[step - 1].force[k];
-    return k % 3 ? f / w->mass[b] + w->settings.gravity[k % 3 - 1] : f / w->inertia[b];
+    const double m = k % 3 ? w->mass[b] : w->inertia[b];
+    return f / m + crm_gravity(w, b, k % 3) -
+           w->bodies[b].damping[k % 3 > 0] * carom_tape_v(t, step)[k];
 }
 
 carom_status crm_tape_current(const carom_tape *t)
@@ -110,19 +112,32 @@ typedef struct array_kind {
     {                                                                                              \
         offsetof(carom_gradient, name), of, each                                                   \
     }
-static const array_kind ARRAYS[CRM_N_ARRAYS] = {
-    ARRAY(q0, BODIES, 3),         ARRAY(v0, BODIES, 3),
-    ARRAY(mass, BODIES, 1),       ARRAY(inertia, BODIES, 1),
-    ARRAY(friction, BODIES, 1),   ARRAY(restitution, BODIES, 1),
-    ARRAY(gravity, ONE, 2),       ARRAY(force, BODIES, 3),
-    ARRAY(force_steps, STEPS, 3), ARRAY(dt, ONE, 1),
-    ARRAY(radius, SHAPES, 1),     ARRAY(vertices, VERTICES, 2),
-    ARRAY(anchors, JOINTS, 4),    ARRAY(axes, JOINTS, 1),
-    ARRAY(angles, JOINTS, 1),     ARRAY(lengths, JOINTS, 1),
-    ARRAY(lower, JOINTS, 1),      ARRAY(upper, JOINTS, 1),
-    ARRAY(stiffness, JOINTS, 1),  ARRAY(damping, JOINTS, 1),
-    ARRAY(rest, JOINTS, 1),       ARRAY(motor_speed, JOINTS, 1),
-    ARRAY(motor_limit, JOINTS, 1)};
+static const array_kind ARRAYS[CRM_N_ARRAYS] = {ARRAY(q0, BODIES, 3),
+                                                ARRAY(v0, BODIES, 3),
+                                                ARRAY(mass, BODIES, 1),
+                                                ARRAY(inertia, BODIES, 1),
+                                                ARRAY(friction, BODIES, 1),
+                                                ARRAY(restitution, BODIES, 1),
+                                                ARRAY(gravity_scale, BODIES, 1),
+                                                ARRAY(linear_damping, BODIES, 1),
+                                                ARRAY(angular_damping, BODIES, 1),
+                                                ARRAY(gravity, ONE, 2),
+                                                ARRAY(force, BODIES, 3),
+                                                ARRAY(force_steps, STEPS, 3),
+                                                ARRAY(dt, ONE, 1),
+                                                ARRAY(radius, SHAPES, 1),
+                                                ARRAY(vertices, VERTICES, 2),
+                                                ARRAY(anchors, JOINTS, 4),
+                                                ARRAY(axes, JOINTS, 1),
+                                                ARRAY(angles, JOINTS, 1),
+                                                ARRAY(lengths, JOINTS, 1),
+                                                ARRAY(lower, JOINTS, 1),
+                                                ARRAY(upper, JOINTS, 1),
+                                                ARRAY(stiffness, JOINTS, 1),
+                                                ARRAY(damping, JOINTS, 1),
+                                                ARRAY(rest, JOINTS, 1),
+                                                ARRAY(motor_speed, JOINTS, 1),
+                                                ARRAY(motor_limit, JOINTS, 1)};
 #undef ARRAY
 
 double *crm_array(const carom_gradient *g, int k)

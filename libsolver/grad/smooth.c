@@ -230,9 +230,9 @@ static carom_status stage_2_vjp(crm_reverse *r, crm_substep *s, double *q_bar, c
     const carom_status e = crm_solve_vjp(r, s, c, v_bar);
     if (e < 0) return e;
     crm_zero(r->world, r->solve_bar);
-    crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, r->solve_bar, h_bar);
+    crm_free_velocity_vjp(r, s, c, r->solve_bar, h_bar);
     crm_drive_vjp(r, s, c, r->solve_bar, q_bar, h_bar);
-    crm_mass_vjp(r);
+    crm_mass_vjp(r, s, c, h_bar);
     for (int k = 0; k < s->n_contacts; k++) {
         const int open = c->cn[k] != 0;
         r->gap_bar[k] = open ? r->bars.cn[k] / s->h : 0;
@@ -270,9 +270,9 @@ static carom_status bounce_vjp(crm_reverse *r, crm_substep *s, double *q_bar, do
     if (e < 0) return e;
     crm_zero(r->world, r->solve_bar);
     crm_zero(r->world, v_bar);
-    crm_free_velocity_vjp(r, s, s->h, 1, v_bar, h_bar);
+    crm_free_velocity_vjp(r, s, c, v_bar, h_bar);
     crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar);
-    crm_mass_vjp(r);
+    crm_mass_vjp(r, s, c, h_bar);
     for (int k = 0; k < s->n_contacts; k++) bounce_side_vjp(r, s, k, v_bar, h_bar);
     crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar);
     return CAROM_OK;
@@ -346,9 +346,9 @@ static carom_status stage_1_vjp(crm_reverse *r, crm_substep *s, double *q_bar, d
     memcpy(r->bars.u, r->total.u, r->n_sides * sizeof(double));
     e = crm_rest_vjp(r);
     if (e < 0) return e;
-    crm_free_velocity_vjp(r, s, 0.5 * s->h, 0.5, v_bar, h_bar);
+    crm_free_velocity_vjp(r, s, c, v_bar, h_bar);
     crm_drive_vjp(r, s, c, v_bar, q_bar, h_bar);
-    crm_mass_vjp(r);
+    crm_mass_vjp(r, s, c, h_bar);
     sides_vjp(r, s, q_bar, h_bar);
     crm_rows_vjp(r, s, c, r->gap_bar, NULL, q_bar);
     return CAROM_OK;

@@ -155,7 +155,7 @@ static carom_status stage_1_jvp(crm_forward *f, crm_substep *s, int n)
         crm_line *line = &f->lines[i];
         crm_copy(w, line->v0, line->v);
         crm_rows_jvp(f, s, c, line);
-        crm_free_velocity_jvp(f, s, line, line->v0, 0.5 * s->h, 0.5);
+        crm_free_velocity_jvp(f, s, c, line, line->v0);
         crm_drive_jvp(f, s, c, line);
         sides_jvp(f, s, line);
         carom_status e = crm_solve_jvp(f, f->rest);
@@ -174,7 +174,7 @@ static carom_status stage_2_jvp(crm_forward *f, crm_substep *s, int n)
     for (int i = 0; i < n; i++) {
         crm_line *line = &f->lines[i];
         crm_rows_jvp(f, s, c, line);
-        crm_free_velocity_jvp(f, s, line, line->v, 0.5 * s->h, 0.5);
+        crm_free_velocity_jvp(f, s, c, line, line->v);
         crm_drive_jvp(f, s, c, line);
         for (int k = 0; k < s->n_contacts; k++) {
             if (c->cn[k] != 0) f->dot.cn[k] = (f->gap[k] - c->cn[k] * line->h) / s->h;
@@ -208,7 +208,7 @@ static carom_status bounce_jvp(crm_forward *f, crm_substep *s, int n)
     for (int i = 0; i < n; i++) {
         crm_line *line = &f->lines[i];
         crm_rows_jvp(f, s, c, line);
-        crm_free_velocity_jvp(f, s, line, line->v0, s->h, 1);
+        crm_free_velocity_jvp(f, s, c, line, line->v0);
         crm_drive_jvp(f, s, c, line);
         for (int k = 0; k < s->n_contacts; k++) f->dot.cn[k] = bounce_side_jvp(f, s, k, line);
         const carom_status e = crm_solve_jvp(f, line->v);

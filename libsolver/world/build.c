@@ -15,6 +15,7 @@ carom_body_def carom_body_defaults(void)
     d.collide = 1;
     d.filter.category = 1;
     d.filter.mask = ~0U;
+    d.gravity_scale = 1;
     return d;
 }
 
@@ -50,11 +51,13 @@ static carom_status check_motion(carom_world *w, const carom_body_def *d)
 static carom_status check_matter(carom_world *w, int id, carom_body_type type, double mass,
                                  double inertia, double friction, double restitution)
 {
+    const int locked = inertia == HUGE_VAL;
     if (type == CAROM_DYNAMIC && !positive(mass)) {
         return crm_world_fail(w, CAROM_E_ARGUMENT, "body %d: mass %g must be positive", id, mass);
     }
-    if (type == CAROM_DYNAMIC && !positive(inertia)) {
-        return crm_world_fail(w, CAROM_E_ARGUMENT, "body %d: inertia %g must be positive", id,
+    if (type == CAROM_DYNAMIC && !positive(inertia) && !locked) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT,
+                              "body %d: inertia %g must be positive (infinite: no rotation)", id,
                               inertia);
     }
     if (!(friction >= 0 && friction < HUGE_VAL)) {
@@ -66,6 +69,18 @@ static carom_status check_matter(carom_world *w, int id, carom_body_type type, d
                               restitution);
     }
     return CAROM_OK;
+}
+
+static carom_status check_weight(carom_world *w, int id, double gravity_scale, double linear,
+                                 double angular)
+{
+    if (!isfinite(gravity_scale)) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT, "body %d: gravity scale not finite", id);
+    }
+    if (linear >= 0 && linear < HUGE_VAL && angular >= 0 && angular < HUGE_VAL) return CAROM_OK;
+    return crm_world_fail(w, CAROM_E_ARGUMENT,
+                          "body %d: damping %g, angular %g: must be finite and 0 or more", id,
+                          linear, angular);
 }
 
 static carom_status check_shapes(carom_world *w, const carom_body_def *d)
@@ -159,6 +174,14 @@ static void add_shapes(carom_world *w, const carom_body_def *d)
     }
 }
 
+/* What is not dynamic keeps its velocity. */
+static void set_damping(crm_body *body, double linear, double angular)
+{
+    const int moves = body->type == CAROM_DYNAMIC;
+    body->damping[0] = moves ? angular : 0;
+    body->damping[1] = moves ? linear : 0;
+}
+
 static void add_body(carom_world *w, const carom_body_def *d)
 {
     const int b = w->n_bodies;
@@ -170,6 +193,8 @@ static void add_body(carom_world *w, const carom_body_def *d)
     body->collide = d->collide;
     body->sensor = d->sensor;
     body->filter = d->filter;
+    body->gravity_scale = d->gravity_scale;
+    set_damping(body, d->linear_damping, d->angular_damping);
     w->q[3 * b] = d->pose.angle;
     w->q[3 * b + 1] = d->pose.x;
     w->q[3 * b + 2] = d->pose.y;
@@ -197,6 +222,10 @@ carom_status carom_world_add_body(carom_world *world, const carom_body_def *def,
     if (!e) {
         e = check_matter(w, w->n_bodies, def->type, def->mass, def->inertia, def->friction,
                          def->restitution);
+    }
+    if (!e) {
+        e = check_weight(w, w->n_bodies, def->gravity_scale, def->linear_damping,
+                         def->angular_damping);
     }
     if (!e) e = check_shapes(w, def);
     if (!e) e = crm_reserve_bodies(w);
@@ -283,6 +312,12 @@ carom_status carom_world_set_parameters(carom_world *world, const carom_paramete
                          p->friction ? p->friction[b] : w->friction[b],
                          p->restitution ? p->restitution[b] : w->restitution[b]);
         if (e) return e;
+        const crm_body *body = &w->bodies[b];
+        const carom_status f =
+            check_weight(w, b, p->gravity_scale ? p->gravity_scale[b] : body->gravity_scale,
+                         p->linear_damping ? p->linear_damping[b] : body->damping[1],
+                         p->angular_damping ? p->angular_damping[b] : body->damping[0]);
+        if (f) return f;
     }
     if (p->gravity && !(isfinite(p->gravity[0]) && isfinite(p->gravity[1]))) {
         return crm_world_fail(w, CAROM_E_ARGUMENT, "gravity not finite");
@@ -291,6 +326,13 @@ carom_status carom_world_set_parameters(carom_world *world, const carom_paramete
     if (p->inertia && bytes) memmove(w->inertia, p->inertia, bytes);
     if (p->friction && bytes) memmove(w->friction, p->friction, bytes);
     if (p->restitution && bytes) memmove(w->restitution, p->restitution, bytes);
+    for (int b = 0; b < w->n_bodies; b++) {
+        crm_body *body = &w->bodies[b];
+        if (p->gravity_scale) body->gravity_scale = p->gravity_scale[b];
+        set_damping(body, p->linear_damping ? p->linear_damping[b] : body->damping[1],
+                    p->angular_damping ? p->angular_damping[b] : body->damping[0]);
+    }
+    crm_find_damping(w);
     if (p->gravity) memcpy(w->settings.gravity, p->gravity, sizeof w->settings.gravity);
     w->revision++;
     return CAROM_OK;

@@ -68,7 +68,8 @@ static carom_status forces(carom_world *w, const double *q, const double *v)
     crm_rows_at(w, s, q);
     rates(w, s, q, v, c);
     for (int i = 0; i < w->island->n_bodies; i++) {
-        crm_free_acceleration(w, w->island->bodies[i], &w->rows.u[3 * i]);
+        const int b = w->island->bodies[i];
+        crm_free_acceleration(w, b, v + 3 * b, &w->rows.u[3 * i]);
     }
     const carom_contact_problem p = crm_problem(w, s, c);
     carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
@@ -139,7 +140,7 @@ static double least_force(const carom_world *w, const double *v)
         const int b = w->island->bodies[i];
         double a[3];
         if (w->bodies[b].type != CAROM_DYNAMIC) continue;
-        crm_free_acceleration(w, b, a);
+        crm_free_acceleration(w, b, v + 3 * b, a);
         largest = fmax(largest, w->mass[b] * (hypot(a[1], a[2]) + top * top / w->length));
     }
     return FORCE_TOL * largest;

@@ -8,9 +8,10 @@ static const double ROUNDING = 1e-10;
 /* Halvings of the interval in which the restitution that gives no energy is sought. */
 enum { MAX_HALVINGS = 6 };
 
-static double square(const carom_world *w, int body, const double *v)
+double crm_mass_square(const carom_world *w, int body, const double *v)
 {
-    return w->inertia[body] * v[0] * v[0] + w->mass[body] * (v[1] * v[1] + v[2] * v[2]);
+    const double turn = w->inertia[body] < HUGE_VAL ? w->inertia[body] * v[0] * v[0] : 0;
+    return turn + w->mass[body] * (v[1] * v[1] + v[2] * v[2]);
 }
 
 double crm_mass_speed(const carom_world *w, const double *v)
@@ -18,7 +19,7 @@ double crm_mass_speed(const carom_world *w, const double *v)
     double sum = 0;
     for (int k = 0; k < w->island->n_bodies; k++) {
         const int b = w->island->bodies[k];
-        sum += square(w, b, v + 3 * b);
+        sum += crm_mass_square(w, b, v + 3 * b);
     }
     return sqrt(sum);
 }
@@ -28,18 +29,19 @@ static double free_speed(const carom_world *w)
 {
     double sum = 0;
     for (int k = 0; k < w->island->n_bodies; k++) {
-        sum += square(w, w->island->bodies[k], w->rows.u + 3 * k);
+        sum += crm_mass_square(w, w->island->bodies[k], w->rows.u + 3 * k);
     }
     return sqrt(sum);
 }
 
-/* Only what is prescribed does work on an island: a kinematic body, or in time a motor. */
+/* Only what is prescribed does work on an island: a kinematic body, or in time a motor; and a
+ * damped solve has other masses than these. */
 static int is_passive(const carom_world *w, const crm_substep *s)
 {
     for (int k = 0; k < w->island->n_bodies; k++) {
         if (w->bodies[w->island->bodies[k]].type != CAROM_DYNAMIC) return 0;
     }
-    return !w->island->n_driven || !(s->h > 0);
+    return (!w->island->n_driven && !w->damped) || !(s->h > 0);
 }
 
 /* v = u + W J'l with J v + c complementary to l has, for c >= 0,

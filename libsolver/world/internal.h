@@ -2,6 +2,7 @@
 #ifndef CRM_WORLD_INTERNAL_H
 #define CRM_WORLD_INTERNAL_H
 
+#include "world/damping.h"
 #include "world/types.h"
 
 /* world.c: sets world->error and returns status. */
@@ -101,12 +102,19 @@ double crm_row_dot(const double row[6], const double *v, int body_a, int body_b)
 void crm_contact_rows(const crm_contact *c, double jn[6], double jt[6]);
 /* Rows of all contacts and joints at q into w->rows, joint errors, inverse masses; sub.moved. */
 void crm_rows_at(carom_world *w, crm_substep *s, const double *q);
-/* W f + g of a body at the forces of this step. */
-void crm_free_acceleration(const carom_world *w, int body, double a[3]);
-/* rows.u = v + h (W f + g). */
-void crm_free_velocity(carom_world *w, const crm_substep *s, const double *v, double h);
+/* W f + g - d v of a body at the forces of this step; v NULL: at rest. */
+void crm_free_acceleration(const carom_world *w, int body, const double *v, double a[3]);
+/* Gravity on number k = 0, 1, 2 of a body's velocity [m/s^2]. */
+double crm_gravity(const carom_world *w, int body, int k);
+/* Whether number k of a body's velocity is damped. */
+static inline int crm_is_damped(const carom_world *w, int body, int k)
+{
+    return w->bodies[body].type == CAROM_DYNAMIC && w->bodies[body].damping[k > 0] > 0;
+}
+/* world->damped. */
+void crm_find_damping(carom_world *w);
 /* rows.u of a solve from the velocities before it, with its springs; rows at c->q in place, where
- * its motors get theirs as c->motor says. */
+ * its motors get theirs as c->motor says, and inverse masses what damping makes of them. */
 void crm_solve_velocity(carom_world *w, const crm_substep *s, const crm_solve *c);
 /* The same with all motors that can act holding their speeds. */
 void crm_solve_start(carom_world *w, const crm_substep *s, crm_solve *c);
@@ -236,6 +244,8 @@ void crm_threads_free(carom_world *w);
 carom_status crm_solver_create(carom_world *w);
 
 /* energy.c */
+/* v' M v of a body; a locked rotation has no part in it. */
+double crm_mass_square(const carom_world *w, int body, const double *v);
 /* Speed of the island in the mass metric: sqrt(v' M v). */
 double crm_mass_speed(const carom_world *w, const double *v);
 /* Right-hand sides of a solve for the present s->restitution; 1 when a contact bounces. */

@@ -54,7 +54,7 @@ static void foresee(carom_world *w, int b, double dt)
     crm_islands *s = &w->islands;
     double a[3];
     double *d = &s->ahead[3 * b];
-    crm_free_acceleration(w, b, a);
+    crm_free_acceleration(w, b, NULL, a);
     for (int k = 0; k < 3; k++) {
         const double step = dt * w->v[3 * b + k];
         const double fall = dt * dt * a[k];

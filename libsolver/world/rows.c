@@ -88,6 +88,17 @@ static void fill_joints(carom_world *w, const double *q)
     }
 }
 
+/* Damping makes every push within h act times the mean of what is kept of it until its end. */
+static void damp_masses(carom_world *w, double h)
+{
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const crm_body *b = &w->bodies[w->island->bodies[i]];
+        for (int k = 0; k < 3; k++) {
+            w->rows.inv_mass[3 * i + k] *= crm_decay_in(b->damping[k > 0], h).mean;
+        }
+    }
+}
+
 static void fill_inverse_masses(carom_world *w)
 {
     for (int i = 0; i < w->island->n_bodies; i++) {
@@ -110,25 +121,46 @@ void crm_rows_at(carom_world *w, crm_substep *s, const double *q)
     fill_joints(w, q);
 }
 
-void crm_free_acceleration(const carom_world *w, int body, double a[3])
+void crm_find_damping(carom_world *w)
+{
+    w->damped = 0;
+    for (int b = 0; b < w->n_bodies; b++) {
+        w->damped |= crm_is_damped(w, b, 0) || crm_is_damped(w, b, 1);
+    }
+}
+
+double crm_gravity(const carom_world *w, int body, int k)
+{
+    const crm_body *b = &w->bodies[body];
+    return b->type == CAROM_DYNAMIC && k > 0 ? b->gravity_scale * w->settings.gravity[k - 1] : 0;
+}
+
+void crm_free_acceleration(const carom_world *w, int body, const double *v, double a[3])
 {
     const double *f = &w->step_force[3 * body];
     a[0] = a[1] = a[2] = 0;
     if (w->bodies[body].type != CAROM_DYNAMIC) return;
-    a[0] = f[0] / w->inertia[body];
-    a[1] = f[1] / w->mass[body] + w->settings.gravity[0];
-    a[2] = f[2] / w->mass[body] + w->settings.gravity[1];
+    for (int k = 0; k < 3; k++) {
+        const double m = k ? w->mass[body] : w->inertia[body];
+        a[k] = f[k] / m + crm_gravity(w, body, k);
+        if (v && w->damped) a[k] -= w->bodies[body].damping[k > 0] * v[k];
+    }
 }
 
-void crm_free_velocity(carom_world *w, const crm_substep *s, const double *v, double h)
+/* rows.u = v + h (W f + g), after damping: keep v + h mean (W f + g), with `mean` in rows.inv_mass
+ * already. */
+static void free_velocity(carom_world *w, const crm_substep *s, const double *v, double h)
 {
     for (int i = 0; i < w->island->n_bodies; i++) {
         const int b = w->island->bodies[i];
-        const int falls = w->bodies[b].type == CAROM_DYNAMIC;
         for (int k = 0; k < 3; k++) {
-            const double g = falls && k > 0 ? w->settings.gravity[k - 1] : 0;
-            const double a = w->rows.inv_mass[3 * i + k] * s->force[3 * b + k] + g;
-            w->rows.u[3 * i + k] = v[3 * b + k] + h * a;
+            const double push = w->rows.inv_mass[3 * i + k] * s->force[3 * b + k];
+            const double g = crm_gravity(w, b, k);
+            double *u = &w->rows.u[3 * i + k];
+            *u = v[3 * b + k] + h * (push + g);
+            if (!w->damped) continue;
+            const crm_decay d = crm_decay_in(w->bodies[b].damping[k > 0], h);
+            *u = d.keep * v[3 * b + k] + h * (push + d.mean * g);
         }
     }
 }
@@ -177,18 +209,17 @@ int crm_velocity_targets(carom_world *w, crm_substep *s, crm_solve *c)
 
 void crm_solve_velocity(carom_world *w, const crm_substep *s, const crm_solve *c)
 {
-    switch (c->kind) {
-    case CRM_VELOCITY: crm_free_velocity(w, s, s->v0, s->h); break;
-    case CRM_CORRECTION:
-    case CRM_HOLD: /* the velocity before it is not known here, and no derivative asks for it */
-    case CRM_HOLD_SPEED:
+    const double h = crm_share(c) * s->h;
+    if (c->kind == CRM_CORRECTION || c->kind == CRM_HOLD || c->kind == CRM_HOLD_SPEED) {
+        /* The velocity before it is not known here, and no derivative asks for it. */
         memset(w->rows.u, 0, 3 * (size_t)w->island->n_bodies * sizeof(double));
-        break;
-    case CRM_IMPACT: crm_free_velocity(w, s, s->v0, 0); break;
-    case CRM_STAGE_1: crm_free_velocity(w, s, s->v0, 0.5 * s->h); break;
-    case CRM_STAGE_2: crm_free_velocity(w, s, c[-1].v, 0.5 * s->h); break;
-    case CRM_BOUNCE: crm_free_velocity(w, s, s->v0, s->h); break;
+        return;
     }
+    if (w->damped) {
+        fill_inverse_masses(w);
+        damp_masses(w, h);
+    }
+    free_velocity(w, s, c->kind == CRM_STAGE_2 ? c[-1].v : s->v0, h);
     if (!w->island->n_driven || !(crm_share(c) > 0)) return;
     crm_springs(w, s, c);
     crm_motors(w, s, c);

@@ -266,7 +266,9 @@ double crm_top_speed(const carom_world *w, const double *v)
 static double bounce_side(const carom_world *w, const crm_substep *s, int k, double apart)
 {
     const crm_contact *c = &s->moved[k];
-    const double g = hypot(w->settings.gravity[0], w->settings.gravity[1]);
+    const double g =
+        hypot(w->settings.gravity[0], w->settings.gravity[1]) *
+        fmax(fabs(w->bodies[c->body_a].gravity_scale), fabs(w->bodies[c->body_b].gravity_scale));
     const double slop = w->settings.margin * w->length;
     if (c->gap > slop) return c->gap / s->h;
     const double un = crm_row_dot(&w->rows.jn[6 * k], s->v0, c->body_a, c->body_b);
@@ -302,8 +304,8 @@ static int gains_energy(const carom_world *w, const crm_substep *s, const double
     for (int k = 0; k < w->island->n_bodies; k++) {
         const int b = w->island->bodies[k];
         if (w->bodies[b].type != CAROM_DYNAMIC) return 0;
-        crm_free_acceleration(w, b, a);
-        push += w->inertia[b] * a[0] * a[0] + w->mass[b] * (a[1] * a[1] + a[2] * a[2]);
+        crm_free_acceleration(w, b, NULL, a);
+        push += crm_mass_square(w, b, a);
         mass += w->mass[b];
     }
     const double most = crm_mass_speed(w, s->v0) + s->h * sqrt(push) + w->recovery * sqrt(mass) +

@@ -107,8 +107,10 @@ static void code_body(crm_coder *c, carom_world *w, int b)
     for (int k = 3 * b; k < 3 * b + 3; k++) crm_code_place(c, &w->v[k], -fastest, fastest);
     if (type == CAROM_DYNAMIC) { /* others have none, whatever stands there */
         crm_code_place(c, &w->mass[b], lightest, DBL_MAX);
-        crm_code_place(c, &w->inertia[b], lightest, DBL_MAX);
+        crm_code_place(c, &w->inertia[b], lightest, HUGE_VAL);
     }
+    crm_code_place(c, &w->bodies[b].gravity_scale, -DBL_MAX, DBL_MAX);
+    for (int k = 0; k < 2; k++) crm_code_place(c, &w->bodies[b].damping[k], 0, DBL_MAX);
     crm_code_place(c, &w->friction[b], 0, DBL_MAX);
     crm_code_place(c, &w->restitution[b], 0, 1);
     crm_code_place(c, &w->carry[b], -w->settings.dt, w->settings.dt);
@@ -292,6 +294,7 @@ static carom_status take_up(carom_world *w, size_t size, const unsigned char *fr
     c.at = 0;
     code_state(&c, w, &w->touches.n);
     for (int k = 0; k < w->n_joints; k++) w->joints[k].lever = w->length;
+    crm_find_damping(w);
     w->statics_placed = 0;
     w->revision++;
     return CAROM_OK;

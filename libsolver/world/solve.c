@@ -361,10 +361,10 @@ void crm_touches_turn(carom_world *w)
     }
 }
 
-/* Free flight is exact as it is. */
+/* Free flight is exact as it is, without damping. */
 static carom_status run_smooth(carom_world *w, double h)
 {
-    const int bound = w->sub.n_contacts > 0 || w->island->n_rows > 0;
+    const int bound = w->sub.n_contacts > 0 || w->island->n_rows > 0 || w->damped;
     return w->settings.order > 2 && bound && !w->sub.ahead ? crm_extrapolate(w, h)
                                                            : crm_smooth(w, h);
 }

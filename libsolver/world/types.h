@@ -37,6 +37,8 @@ typedef struct crm_body {
     int unknown;   /* index in the island under way, -1: static */
     int n_springs; /* springs and motors on it; set by seal */
     double reach;  /* farthest point of its shapes from the position [m]; set by seal */
+    double gravity_scale;
+    double damping[2]; /* of omega; of vx and vy [1/s] */
     carom_filter filter;
 } crm_body;
 
@@ -304,6 +306,7 @@ struct carom_world {
     int n_moving;
     double length; /* L [m] */
     int smooth;    /* 1: two-stage map; 0: Euler */
+    int damped;    /* 1: some body is */
     carom_plan plan;
     int n_solves;      /* that sub-steps have states for: those of the map, and corrections */
     double speed;      /* sqrt(g L) [m/s] */

@@ -194,8 +194,8 @@ double carom_world_energy(const carom_world *world)
         if (w->bodies[b].type != CAROM_DYNAMIC) continue;
         const double *q = w->q + 3 * b;
         const double *v = w->v + 3 * b;
-        energy += 0.5 * (w->inertia[b] * v[0] * v[0] + w->mass[b] * (v[1] * v[1] + v[2] * v[2])) -
-                  w->mass[b] * (w->settings.gravity[0] * q[1] + w->settings.gravity[1] * q[2]);
+        energy += 0.5 * crm_mass_square(w, b, v) -
+                  w->mass[b] * (crm_gravity(w, b, 1) * q[1] + crm_gravity(w, b, 2) * q[2]);
     }
     return energy;
 }

@@ -7,9 +7,31 @@
 #include <stdlib.h>
 
 const char *const gradient_array_names[N_GRADIENT_ARRAYS] = {
-    "q0",    "v0",        "mass",     "inertia", "friction",    "restitution", "gravity", "force",
-    "dt",    "radius",    "vertices", "anchors", "axes",        "angles",      "lengths", "lower",
-    "upper", "stiffness", "damping",  "rest",    "motor_speed", "motor_limit",
+    "q0",
+    "v0",
+    "mass",
+    "inertia",
+    "friction",
+    "restitution",
+    "gravity_scale",
+    "linear_damping",
+    "angular_damping",
+    "gravity",
+    "force",
+    "dt",
+    "radius",
+    "vertices",
+    "anchors",
+    "axes",
+    "angles",
+    "lengths",
+    "lower",
+    "upper",
+    "stiffness",
+    "damping",
+    "rest",
+    "motor_speed",
+    "motor_limit",
 };
 
 int gradient_count(const carom_world *w, int array)
@@ -58,6 +80,9 @@ double *gradient_number(carom_world *w, int array, int k)
     case BY_INERTIA: return &w->inertia[k];
     case BY_FRICTION: return &w->friction[k];
     case BY_RESTITUTION: return &w->restitution[k];
+    case BY_GRAVITY_SCALE: return &w->bodies[k].gravity_scale;
+    case BY_LINEAR_DAMPING: return &w->bodies[k].damping[1];
+    case BY_ANGULAR_DAMPING: return &w->bodies[k].damping[0];
     case BY_GRAVITY: return &w->settings.gravity[k];
     case BY_FORCE: return &w->force[k];
     case BY_DT: return &w->settings.dt;
@@ -84,7 +109,10 @@ int gradient_has_meaning(const carom_world *w, int array, int k)
 {
     switch (array) {
     case BY_MASS:
-    case BY_INERTIA: return w->bodies[k].type == CAROM_DYNAMIC;
+    case BY_GRAVITY_SCALE: return w->bodies[k].type == CAROM_DYNAMIC;
+    case BY_INERTIA: return w->bodies[k].type == CAROM_DYNAMIC && w->inertia[k] < HUGE_VAL;
+    case BY_LINEAR_DAMPING: return crm_is_damped(w, k, 1);
+    case BY_ANGULAR_DAMPING: return crm_is_damped(w, k, 0);
     case BY_FORCE: return w->bodies[k / 3].type == CAROM_DYNAMIC;
     case BY_V0: return w->bodies[k / 3].type != CAROM_STATIC;
     default: return array <= BY_ANCHORS || joint_has(&w->joints[k], array);
@@ -106,6 +134,9 @@ gradient_room gradient_room_make(const carom_world *w, int rows)
     x.g.inertia = x.array[BY_INERTIA];
     x.g.friction = x.array[BY_FRICTION];
     x.g.restitution = x.array[BY_RESTITUTION];
+    x.g.gravity_scale = x.array[BY_GRAVITY_SCALE];
+    x.g.linear_damping = x.array[BY_LINEAR_DAMPING];
+    x.g.angular_damping = x.array[BY_ANGULAR_DAMPING];
     x.g.gravity = x.array[BY_GRAVITY];
     x.g.force = x.array[BY_FORCE];
     x.g.dt = x.array[BY_DT];

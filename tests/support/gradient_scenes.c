@@ -230,7 +230,28 @@ static carom_world *kinematic_belt(const gradient_scene *s)
     return w;
 }
 
+/* Damped parts on a damped pendulum, one of which does not turn; a damped ball that slides, and
+ * hits.
+ */
+static carom_world *damped_parts(const gradient_scene *s)
+{
+    carom_world *w = pendulum(s);
+    const int ball = scene_disc(w, 0.8, 0.2, -0.6, 0.9, 0.3, 0.4);
+    const int locked = scene_box(w, 0.5, 0.2, 0.1, at(2.6, 0.3, 0.3), 0.3, 0);
+    const carom_vec2 pin = {2.2, 0.1};
+    assert_int_equal(carom_world_add_revolute(w, 2, locked, pin, NULL), CAROM_OK);
+    w->inertia[locked] = HUGE_VAL;
+    for (int b = 1; b < carom_world_n_bodies(w); b++) {
+        w->bodies[b].damping[0] = b == ball ? 0 : 0.4 * b;
+        w->bodies[b].damping[1] = 0.3 + 0.2 * b;
+        w->bodies[b].gravity_scale = 1.5 - 0.2 * b;
+    }
+    scene_push(w, ball, 2, 3.5, -1);
+    return w;
+}
+
 const gradient_scene gradient_scenes[] = {
+    {"damped parts", damped_parts, 30, STEP, 0},
     {"sliding box", sliding_box, 30, STEP, 0},
     {"slide to roll", slide_to_roll, 60, STEP, 0},
     {"oblique stick", oblique_stick, 30, STEP, 0},

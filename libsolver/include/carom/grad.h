@@ -40,31 +40,35 @@ typedef struct carom_state_bar {
 } carom_state_bar;
 
 /* Where the gradient goes: NULL is not computed; given arrays are overwritten.
- * Mass and inertia are partial derivatives of the stored numbers: gravity is mass * g. */
+ * Mass and inertia are partial derivatives of the stored numbers: gravity is mass * g.  What is not
+ * damped, has no spring, limit or motor, has no derivative by it: 0. */
 typedef struct carom_gradient {
-    double *q0;           /* 3 n_bodies, state at the start of the tape */
-    double *v0;           /* 3 n_bodies */
-    double *mass;         /* n_bodies */
-    double *inertia;      /* n_bodies */
-    double *friction;     /* n_bodies */
-    double *restitution;  /* n_bodies */
-    double *gravity;      /* 2 */
-    double *force;        /* 3 n_bodies: a constant force on each body through all steps */
-    double *force_steps;  /* 3 n_bodies x steps: the force of each step */
-    double *dt;           /* 1: length of the step */
-    double *radius;       /* n_shapes, in the order of adding */
-    carom_vec2 *vertices; /* n_vertices, in the order of adding; body frame */
-    carom_vec2 *anchors;  /* 2 n_joints: anchor in the frame of body A, then of body B */
-    double *axes;         /* n_joints: direction of the line in the frame of body A, an angle */
-    double *angles;       /* n_joints: held turn of body B against body A */
-    double *lengths;      /* n_joints: held distance */
-    double *lower;        /* n_joints: limits */
-    double *upper;        /* n_joints */
-    double *stiffness;    /* n_joints: springs and motors, as in carom_joint_def */
-    double *damping;      /* n_joints */
-    double *rest;         /* n_joints */
-    double *motor_speed;  /* n_joints */
-    double *motor_limit;  /* n_joints */
+    double *q0;              /* 3 n_bodies, state at the start of the tape */
+    double *v0;              /* 3 n_bodies */
+    double *mass;            /* n_bodies */
+    double *inertia;         /* n_bodies */
+    double *friction;        /* n_bodies */
+    double *restitution;     /* n_bodies */
+    double *gravity_scale;   /* n_bodies */
+    double *linear_damping;  /* n_bodies */
+    double *angular_damping; /* n_bodies */
+    double *gravity;         /* 2 */
+    double *force;           /* 3 n_bodies: a constant force on each body through all steps */
+    double *force_steps;     /* 3 n_bodies x steps: the force of each step */
+    double *dt;              /* 1: length of the step */
+    double *radius;          /* n_shapes, in the order of adding */
+    carom_vec2 *vertices;    /* n_vertices, in the order of adding; body frame */
+    carom_vec2 *anchors;     /* 2 n_joints: anchor in the frame of body A, then of body B */
+    double *axes;            /* n_joints: direction of the line in the frame of body A, an angle */
+    double *angles;          /* n_joints: held turn of body B against body A */
+    double *lengths;         /* n_joints: held distance */
+    double *lower;           /* n_joints: limits */
+    double *upper;           /* n_joints */
+    double *stiffness;       /* n_joints: springs and motors, as in carom_joint_def */
+    double *damping;         /* n_joints */
+    double *rest;            /* n_joints */
+    double *motor_speed;     /* n_joints */
+    double *motor_limit;     /* n_joints */
 } carom_gradient;
 
 /* What a pass over the tape has met and done. */

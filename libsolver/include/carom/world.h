@@ -79,16 +79,20 @@ typedef struct carom_body_def {
     double velocity[3]; /* (omega, vx, vy) [rad/s, m/s, m/s] */
     double force[3];    /* constant (torque, fx, fy) [N m, N, N] */
     double mass;        /* [kg], > 0 when dynamic */
-    double inertia;     /* about the center of mass [kg m^2], > 0 when dynamic */
+    double inertia;     /* about the center of mass [kg m^2], > 0 when dynamic; INFINITY locks the
+                         * rotation: omega stays what it is, whatever happens */
     double friction;    /* [1], >= 0 */
     double restitution; /* [1], 0 to 1 */
     int collide;        /* 0: no contacts at all */
     int sensor;         /* 1: touches nothing; carom_query_sensors tells what overlaps its shapes */
     carom_filter filter;
+    double gravity_scale;   /* times the world's gravity [1], any finite number */
+    double linear_damping;  /* d in the force -d m v [1/s], >= 0 */
+    double angular_damping; /* d in the torque -d I omega [1/s], >= 0 */
 } carom_body_def;
 
-/* Dynamic, no shape, mass 1, inertia 1, friction 0.5, restitution 0, collides with all, no sensor.
- */
+/* Dynamic, no shape, mass 1, inertia 1, friction 0.5, restitution 0, collides with all, no sensor,
+ * gravity scale 1, no damping. */
 CAROM_API carom_body_def carom_body_defaults(void);
 /* The same of a type and at a place [m]. */
 CAROM_API carom_body_def carom_body_at(carom_body_type type, double x, double y);
@@ -232,6 +236,9 @@ typedef struct carom_parameters {
     const double *inertia;
     const double *friction;
     const double *restitution;
+    const double *gravity_scale;
+    const double *linear_damping;
+    const double *angular_damping;
     const double *gravity; /* 2 */
 } carom_parameters;
 CAROM_API carom_status carom_world_set_parameters(carom_world *world, const carom_parameters *p);
