@@ -209,7 +209,7 @@ static void parameters_come_along(void **state)
         friction[k] = 0.05 * k;
     }
     const double gravity[2] = {0.5, -8};
-    const carom_parameters p = {mass, NULL, friction, NULL, gravity};
+    const carom_parameters p = {.mass = mass, .friction = friction, .gravity = gravity};
     scene_run(a, 10, NULL);
     assert_int_equal(carom_world_set_parameters(a, &p), CAROM_OK);
     blob s = snapshot_of(a);

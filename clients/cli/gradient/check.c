@@ -108,10 +108,12 @@ static carom_status perturb_start(checker *c, carom_world *w, crm_wrt array, int
     const crm_scene_body *b = &c->run->scene->bodies[array == CRM_MASS ? index : 0];
     double *inertia = array == CRM_MASS && !b->has_inertia ? &c->p[1][index] : NULL;
     if (inertia) *inertia = b->def.inertia * (1 + delta / kept);
-    const carom_parameters p = {
-        array == CRM_MASS ? c->p[0] : NULL, inertia || array == CRM_INERTIA ? c->p[1] : NULL,
-        array == CRM_FRICTION ? c->p[2] : NULL, array == CRM_RESTITUTION ? c->p[3] : NULL,
-        array == CRM_GRAVITY ? gravity : NULL};
+    carom_parameters p = {0};
+    p.mass = array == CRM_MASS ? c->p[0] : NULL;
+    p.inertia = inertia || array == CRM_INERTIA ? c->p[1] : NULL;
+    p.friction = array == CRM_FRICTION ? c->p[2] : NULL;
+    p.restitution = array == CRM_RESTITUTION ? c->p[3] : NULL;
+    p.gravity = array == CRM_GRAVITY ? gravity : NULL;
     carom_status s = carom_world_set_state(w, c->q, c->v);
     if (s >= 0 && array >= CRM_MASS && array <= CRM_GRAVITY) s = carom_world_set_parameters(w, &p);
     if (x) *x = kept;

@@ -236,10 +236,10 @@ typedef struct carom_parameters {
     const double *inertia;
     const double *friction;
     const double *restitution;
+    const double *gravity; /* 2 */
     const double *gravity_scale;
     const double *linear_damping;
     const double *angular_damping;
-    const double *gravity; /* 2 */
 } carom_parameters;
 CAROM_API carom_status carom_world_set_parameters(carom_world *world, const carom_parameters *p);
 
