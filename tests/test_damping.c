@@ -306,6 +306,24 @@ static void refused(void **state)
     carom_world_destroy(w);
 }
 
+/* Free flight is not extrapolated; damping that begins later would find no tables for it. */
+static void begins_in_time(void **state)
+{
+    (void)state;
+    const double some[1] = {0.5};
+    const carom_parameters p = {.angular_damping = some};
+    scene_integrator = CAROM_LOCATED;
+    scene_order = 4;
+    carom_world *w = scene_world(9.81, 1.0 / 60);
+    scene_order = 2;
+    scene_push(w, add_disc(w, 0, 0, 0, 0), 1, 0, 0);
+    scene_run(w, 1, NULL);
+    assert_int_equal(carom_world_set_parameters(w, &p), CAROM_E_STATE);
+    scene_run(w, 59, NULL);
+    assert_near(carom_world_v(w)[0], 1, 0);
+    carom_world_destroy(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -314,6 +332,7 @@ int main(void)
         cmocka_unit_test(locked_rotation),         cmocka_unit_test(locked_body_turns_on),
         cmocka_unit_test(gravity_scales),          cmocka_unit_test(weight_on_the_floor),
         cmocka_unit_test(kinematic_is_not_damped), cmocka_unit_test(refused),
+        cmocka_unit_test(begins_in_time),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

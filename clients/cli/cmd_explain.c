@@ -133,6 +133,7 @@ static void explain_plan(FILE *f, const carom_plan *p)
     plan_row(f, "joints", p->joints, "joint rows and their corrections", "no border, no drift");
     plan_row(f, "limits", p->limits, "joints have limits", "no joint has limits");
     plan_row(f, "springs, motors", p->drives, "joints have springs or motors", "no such forces");
+    plan_row(f, "damping", p->damping, "bodies are damped", "no body is");
     plan_row(f, "contact solver", p->solver, "a problem is solved where something touches or holds",
              "motion is free: no solve, no matrix");
     plan_row(f, "located impacts", p->located, "times of impacts are sought",

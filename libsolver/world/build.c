@@ -300,6 +300,18 @@ carom_status carom_world_exclude(carom_world *world, int body_a, int body_b)
     return CAROM_OK;
 }
 
+/* Damping in a world of free flight that was sealed without extrapolation. */
+static int damps_late(const carom_world *w, const carom_parameters *p)
+{
+    int damps = 0;
+    for (int b = 0; b < w->n_bodies; b++) {
+        damps |= (p->linear_damping && p->linear_damping[b] > 0) ||
+                 (p->angular_damping && p->angular_damping[b] > 0);
+    }
+    const int wants = w->settings.order > 2 && w->settings.integrator == CAROM_LOCATED;
+    return w->sealed && wants && !w->plan.extrapolated && damps;
+}
+
 carom_status carom_world_set_parameters(carom_world *world, const carom_parameters *p)
 {
     if (!world || !p) return CAROM_E_ARGUMENT;
@@ -322,6 +334,12 @@ carom_status carom_world_set_parameters(carom_world *world, const carom_paramete
     if (p->gravity && !(isfinite(p->gravity[0]) && isfinite(p->gravity[1]))) {
         return crm_world_fail(w, CAROM_E_ARGUMENT, "gravity not finite");
     }
+    if (damps_late(w, p)) {
+        return crm_world_fail(w, CAROM_E_STATE,
+                              "damping at order %d begins before the world is sealed: give a body "
+                              "some, however little",
+                              w->settings.order);
+    }
     if (p->mass && bytes) memmove(w->mass, p->mass, bytes);
     if (p->inertia && bytes) memmove(w->inertia, p->inertia, bytes);
     if (p->friction && bytes) memmove(w->friction, p->friction, bytes);
@@ -332,7 +350,7 @@ carom_status carom_world_set_parameters(carom_world *world, const carom_paramete
         set_damping(body, p->linear_damping ? p->linear_damping[b] : body->damping[1],
                     p->angular_damping ? p->angular_damping[b] : body->damping[0]);
     }
-    crm_find_damping(w);
+    w->damped = crm_world_is_damped(w);
     if (p->gravity) memcpy(w->settings.gravity, p->gravity, sizeof w->settings.gravity);
     w->revision++;
     return CAROM_OK;

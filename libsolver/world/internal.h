@@ -111,8 +111,7 @@ static inline int crm_is_damped(const carom_world *w, int body, int k)
 {
     return w->bodies[body].type == CAROM_DYNAMIC && w->bodies[body].damping[k > 0] > 0;
 }
-/* world->damped. */
-void crm_find_damping(carom_world *w);
+int crm_world_is_damped(const carom_world *w);
 /* rows.u of a solve from the velocities before it, with its springs; rows at c->q in place, where
  * its motors get theirs as c->motor says, and inverse masses what damping makes of them. */
 void crm_solve_velocity(carom_world *w, const crm_substep *s, const crm_solve *c);

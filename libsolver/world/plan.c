@@ -92,9 +92,11 @@ carom_plan crm_plan(const carom_world *w)
     read_shapes(w, &p);
     read_materials(w, &p);
     read_joints(w, &p);
+    p.damping = crm_world_is_damped(w);
     p.solver = p.contacts || w->n_joint_rows > 0 || p.limits;
     p.located = (p.contacts || p.limits) && w->settings.integrator != CAROM_FIXED;
-    p.extrapolated = p.solver && w->settings.order > 2 && w->settings.integrator == CAROM_LOCATED;
+    p.extrapolated =
+        (p.solver || p.damping) && w->settings.order > 2 && w->settings.integrator == CAROM_LOCATED;
     p.threads = w->settings.threads > 1;
     return p;
 }

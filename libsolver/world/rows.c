@@ -121,12 +121,12 @@ void crm_rows_at(carom_world *w, crm_substep *s, const double *q)
     fill_joints(w, q);
 }
 
-void crm_find_damping(carom_world *w)
+int crm_world_is_damped(const carom_world *w)
 {
-    w->damped = 0;
     for (int b = 0; b < w->n_bodies; b++) {
-        w->damped |= crm_is_damped(w, b, 0) || crm_is_damped(w, b, 1);
+        if (crm_is_damped(w, b, 0) || crm_is_damped(w, b, 1)) return 1;
     }
+    return 0;
 }
 
 double crm_gravity(const carom_world *w, int body, int k)

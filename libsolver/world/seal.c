@@ -216,7 +216,7 @@ static carom_status seal(carom_world *w, int as_is)
     set_scales(w);
     count_moving(w);
     count_springs(w);
-    crm_find_damping(w);
+    w->damped = crm_world_is_damped(w);
     w->plan = crm_plan(w);
     w->n_solves = w->plan.solver ? CRM_MAX_SOLVES : 2;
     carom_status e = allocate(w);

@@ -294,7 +294,7 @@ static carom_status take_up(carom_world *w, size_t size, const unsigned char *fr
     c.at = 0;
     code_state(&c, w, &w->touches.n);
     for (int k = 0; k < w->n_joints; k++) w->joints[k].lever = w->length;
-    crm_find_damping(w);
+    w->damped = crm_world_is_damped(w);
     w->statics_placed = 0;
     w->revision++;
     return CAROM_OK;

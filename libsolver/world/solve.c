@@ -365,8 +365,8 @@ void crm_touches_turn(carom_world *w)
 static carom_status run_smooth(carom_world *w, double h)
 {
     const int bound = w->sub.n_contacts > 0 || w->island->n_rows > 0 || w->damped;
-    return w->settings.order > 2 && bound && !w->sub.ahead ? crm_extrapolate(w, h)
-                                                           : crm_smooth(w, h);
+    return w->plan.extrapolated && bound && !w->sub.ahead ? crm_extrapolate(w, h)
+                                                          : crm_smooth(w, h);
 }
 
 carom_status crm_map_run(carom_world *w, double h)

@@ -264,6 +264,7 @@ typedef struct carom_plan {
     int joints;       /* joint rows, corrections of position */
     int limits;       /* of joints: contacts without shapes */
     int drives;       /* springs and motors */
+    int damping;      /* of bodies */
     int solver;       /* contact problems are solved: contacts, joint rows or limits */
     int located;      /* times of impacts are sought */
     int extrapolated; /* orders above 2: tables of sub-steps */
