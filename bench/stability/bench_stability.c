@@ -19,10 +19,10 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Seconds of a cell's steps; it is killed after KILL times as many. */
+/* Seconds of a cell's steps; it is killed when a step goes on for so many more. */
 static const double LIMIT_QUICK = 0.3;
-static const double LIMIT_FULL = 10;
-enum { KILL_AFTER = 6 };
+static const double LIMIT_FULL = 5;
+enum { KILL_AFTER = 30 };
 
 static const char *const COLORS[] = {"green", "yellow", "red", "black", "none"};
 
@@ -72,7 +72,7 @@ static outcome run_apart(const family *f, double x, double y, const engine *e, d
     const pid_t child = fork();
     if (child < 0) abort();
     if (child == 0) {
-        alarm((unsigned)ceil(KILL_AFTER * limit));
+        alarm((unsigned)ceil(KILL_AFTER + 2 * limit));
         o = run_here(f, x, y, e, limit);
         const ssize_t sent = write(ends[1], &o, sizeof o);
         _exit(sent != (ssize_t)sizeof o);
@@ -86,7 +86,7 @@ static outcome run_apart(const family *f, double x, double y, const engine *e, d
     memset(&o, 0, sizeof o);
     o.color = BLACK;
     o.error = o.gradient = -1;
-    o.seconds = KILL_AFTER * limit;
+    o.seconds = KILL_AFTER + 2 * limit;
     snprintf(o.why, sizeof o.why, "%s",
              WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM ? "a step does not end"
                                                                 : "crashed");

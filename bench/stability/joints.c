@@ -211,11 +211,9 @@ static void rotor(trial *t, double speed, double ratio)
 
 const family JOINT_FAMILIES[] = {
     {"chain falls", "links", "end / link mass", COUNT(LINKS), COUNT(RATIOS), LINKS, RATIOS,
-     chain_falls, NULL,
-     "light links between heavy ones: (h w)^2 = h^2 g ratio / l > 4, too stiff for this step"},
+     chain_falls, NULL, "h w = h sqrt(12 g ratio / l) > 512: more parts than max_stiff"},
     {"chain hangs", "links", "end / link mass", COUNT(LINKS), COUNT(RATIOS), LINKS, RATIOS,
-     chain_hangs, "nothing moves",
-     "light links under load: (h w)^2 = h^2 g ratio / l > 4, too stiff for this step"},
+     chain_hangs, "nothing moves", "h w = h sqrt(12 g ratio / l) > 512: more parts than max_stiff"},
     {"double pendulum", "mass ratio", "dt [s]", COUNT(RATIOS), COUNT(STEPS), RATIOS, STEPS,
      double_pendulum, NULL, NULL},
     {"hinges given again", "times", "mass ratio", COUNT(TIMES), COUNT(RATIOS), TIMES, RATIOS,

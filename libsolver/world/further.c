@@ -41,14 +41,21 @@ static carom_status insert(carom_world *w, int at, const crm_contact *c)
     return CAROM_OK;
 }
 
+double crm_deep(const carom_world *w, carom_pair pair, double rounding)
+{
+    const double thin = fmin(w->shapes[pair.a].thickness, w->shapes[pair.b].thickness);
+    return CRM_DEEP * fmin(w->length, thin) + rounding;
+}
+
 /* Deep points of a pair at q1 that are no contacts yet and were open at q0. */
-static carom_status add_pair(carom_world *w, carom_pair pair, const carom_manifold *m, int *added)
+static carom_status add_pair(carom_world *w, carom_pair pair, const carom_manifold *m, double deep,
+                             int *added)
 {
     crm_substep *s = &w->sub;
     const double slop = w->settings.margin * w->length;
     for (int i = 0; i < m->count; i++) {
         crm_contact c = crm_contact_of(w, pair, m, i, s->q1);
-        if (c.gap > -CRM_DEEP * w->length) continue;
+        if (c.gap > -deep) continue;
         const int at = place_for(s, &c);
         crm_contact_refresh(w, s->q0, &c);
         if (at < 0 || c.gap < -slop) continue;
@@ -63,16 +70,17 @@ static carom_status add_pair(carom_world *w, carom_pair pair, const carom_manifo
 carom_status crm_detect_further(carom_world *w, int look, int *added, int *deep)
 {
     const crm_island *island = w->island;
+    const double rounding = crm_rounding(w);
     *added = 0;
     *deep = 0;
     for (int k = 0; k < island->n_pairs; k++) {
         const carom_pair pair = island->pairs[k];
         if (crm_far_apart(w, pair, w->sub.q1, 0)) continue;
         const carom_manifold m = crm_collide(w, pair, w->sub.q1, 0);
-        if (!m.count || m.distance > -CRM_DEEP * w->length) continue;
-        *deep |=
-            m.distance < crm_collide(w, pair, w->sub.q0, HUGE_VAL).distance - CRM_DEEP * w->length;
-        const carom_status e = look ? add_pair(w, pair, &m, added) : CAROM_OK;
+        const double far = crm_deep(w, pair, rounding);
+        if (!m.count || m.distance > -far) continue;
+        *deep |= m.distance < crm_collide(w, pair, w->sub.q0, HUGE_VAL).distance - far;
+        const carom_status e = look ? add_pair(w, pair, &m, far, added) : CAROM_OK;
         if (e) return e;
     }
     return CAROM_OK;

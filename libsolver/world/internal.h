@@ -70,6 +70,8 @@ carom_status crm_detect(carom_world *w, const double *q, double margin);
 /* The same with every contact point that velocities like v could close within h, speculative. */
 carom_status crm_detect_ahead(carom_world *w, const double *q, const double *v, double h,
                               double margin);
+/* further.c: overlap of a pair that counts as deep [m]. */
+double crm_deep(const carom_world *w, carom_pair pair, double rounding);
 /* further.c: *deep: some overlap at q1 is new and deep; with look, its points that were open at q0
  * become contacts of sub, to be solved again. */
 carom_status crm_detect_further(carom_world *w, int look, int *added, int *deep);

@@ -127,8 +127,9 @@ typedef struct search {
 /* Overlap at q1 that the pair did not have at q0. */
 static int is_new(const carom_world *w, const watch *x)
 {
-    const double deep = CRM_DEEP * w->length;
-    if (x->limit || x->g1 > -deep) return 0;
+    if (x->limit) return 0;
+    const double deep = crm_deep(w, x->pair, crm_rounding(w));
+    if (x->g1 > -deep) return 0;
     return x->g1 < crm_collide(w, x->pair, w->sub.q0, HUGE_VAL).distance - deep;
 }
 

@@ -8,7 +8,7 @@
  * h w < 2, with w the frequency at which a force turns the body it pulls at.  An extrapolated map,
  * whose other columns are finer, may go on where its first one is at that limit. */
 static const double MOST_TURN = 2;
-static const double MOST_TURN_EXTRAPOLATED = 3;
+static const double EXTRAPOLATED = 1.5; /* as much */
 
 static double inverse(const carom_world *w, const double *of, int body)
 {
@@ -47,15 +47,15 @@ static double asked(const carom_world *w)
         square = fmax(square, stiffness_of(w, &w->joints[w->island->joints[k]]));
     }
     /* Most bodies have two joints. */
-    const double most = w->settings.order > 2 ? MOST_TURN_EXTRAPOLATED : MOST_TURN;
-    return w->settings.dt * sqrt(2 * square) / most;
+    const double n = w->settings.dt * sqrt(2 * square) / MOST_TURN;
+    return w->settings.order > 2 && n <= EXTRAPOLATED ? 1 : n;
 }
 
 /* A number that followed each change of a force would make the motion jump with it: a power of two,
  * that only grows while the frame lasts. */
 double crm_stiff_span(carom_world *w, double left)
 {
-    if (w->settings.integrator == CAROM_FIXED || !w->island->n_joints) return left;
+    if (!w->island->n_joints) return left;
     const double n = asked(w);
     if (n > w->n_parts) {
         if (!w->n_parts) w->n_parts = 1;

@@ -23,7 +23,7 @@
 /* Factorizations of an island in a frame from which on a solve is left early where another map or a
  * shorter sub-step may do, and from which on the rest of the frame is one Euler sub-step. */
 enum { CRM_BRIEF = 1000, CRM_WORN = 5000 };
-/* New overlap that is worth another solve, or said [L]. */
+/* New overlap that is worth another solve, or said [L, or thickness of a thinner shape]. */
 #define CRM_DEEP 1e-4
 /* Approach below this is rest [fastest point of the world]. */
 #define CRM_REST_TOL 1e-9
