@@ -181,6 +181,23 @@ static void print_check(const crm_check *c)
     if (c->interrupted) fputs("check interrupted; the entries above were checked\n", stderr);
 }
 
+static void put_kinks(crm_output *out, const crm_gradient *g)
+{
+    crm_put_raw(out, ",\"kinks\":[");
+    for (int k = 0; k < g->n_kinks; k++) {
+        const carom_kink *x = &g->kinks[k];
+        const double bodies[2] = {x->body_a, x->body_b};
+        crm_put_raw(out, k ? ",{" : "{");
+        crm_put_field(out, 1, "step", x->step);
+        crm_put_key(out, 0, "bodies");
+        crm_put_numbers(out, 2, bodies);
+        crm_put_key(out, 0, "kind");
+        crm_put_text(out, carom_kink_name(x->kind));
+        crm_put_raw(out, "}");
+    }
+    crm_put_raw(out, "]");
+}
+
 static int write_gradient(const crm_arguments *a, const crm_run *run, const crm_gradient *g,
                           const crm_check *check)
 {
@@ -191,6 +208,7 @@ static int write_gradient(const crm_arguments *a, const crm_run *run, const crm_
     crm_put_key(&out, 0, "gradient");
     put_arrays(&out, run->scene, g);
     crm_put_field(&out, 0, "degenerate", g->degenerate);
+    if (g->name_kinks) put_kinks(&out, g);
     crm_put_field(&out, 0, "seconds_forward", g->seconds_forward);
     crm_put_field(&out, 0, "seconds_backward", g->seconds_backward);
     if (check) put_check(&out, g, check);
@@ -221,6 +239,7 @@ static int differentiate(const crm_arguments *a, const crm_run *run)
     crm_loss loss;
     crm_gradient g;
     crm_gradient_prepare(&g, run->scene);
+    g.name_kinks = crm_argument_given(a, "--kinks");
     int code = choose_wanted(a, &g);
     if (code == CRM_DONE && !crm_loss_read(&problems, run->scene, run->n_steps, &loss)) {
         code = CRM_USAGE;
@@ -247,17 +266,22 @@ static int run(const crm_arguments *a)
     return code;
 }
 
-static const crm_option options[] = {CRM_LOAD_OPTIONS,           {"--loss", CRM_TAKES_VALUE},
-                                     {"--wrt", CRM_TAKES_VALUE}, {"--check", CRM_TAKES_OPTIONAL},
-                                     {"--out", CRM_TAKES_VALUE}, {NULL, 0}};
+static const crm_option options[] = {CRM_LOAD_OPTIONS,
+                                     {"--loss", CRM_TAKES_VALUE},
+                                     {"--wrt", CRM_TAKES_VALUE},
+                                     {"--check", CRM_TAKES_OPTIONAL},
+                                     {"--kinks", 0},
+                                     {"--out", CRM_TAKES_VALUE},
+                                     {NULL, 0}};
 
 const crm_command crm_command_gradient = {
     "gradient",
-    "gradient SCENE --loss LOSS [--wrt mass,friction,...] [--check[=N]] [--out FILE]",
+    "gradient SCENE --loss LOSS [--wrt mass,friction,...] [--check[=N]] [--kinks] [--out FILE]",
     "a loss of the run and its exact gradient, as one JSON object",
     "  --loss LOSS        file with the terms, \"-\" for standard input\n"
     "  --wrt NAMES        of q0, v0, mass, inertia, friction, restitution, gravity, radius,\n"
     "                     vertices, anchors, force, dt; all when not given\n"
+    "  --kinks            where derivatives are one-sided: step, bodies and kind\n"
     "  --check[=N]        N entries of each array (20) beside central differences\n" CRM_LOAD_HELP
     "  --out FILE         where the result goes, standard output otherwise\n",
     options,

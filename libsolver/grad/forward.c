@@ -10,6 +10,9 @@ void crm_begin_solve(crm_forward *f, crm_substep *s, const crm_solve *c)
     crm_gather(w, c->v, w->rows.v);
     const carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
     f->solution = x;
+    const carom_status e =
+        crm_kinks_of_solve(w, &f->tape->memory, &f->kinks, f->frame + 1, s, c, &f->problem);
+    if (e < 0) f->kinks_met = e;
 }
 
 /* W = 1 / m. */

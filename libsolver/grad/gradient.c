@@ -146,8 +146,8 @@ static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar, 
     const double slope = crm_event_jvp(f, s, clock);
     const double h_bar = dot_island(w, r->q_bar, clock->q) + dot_island(w, r->v_bar, clock->v);
     if (fabs(slope) <= crm_grazing(w, s)) {
-        r->stats.degenerate++;
-        return CAROM_OK;
+        return crm_kinks_add(&r->tape->memory, &r->kinks, r->frame + 1, &s->event,
+                             CAROM_KINK_GRAZING);
     }
     *k = -(h_bar - left_bar) / slope;
     event_vjp(r, s, *k);
@@ -175,7 +175,6 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
     drop_negligible(r->world, r->v_bar, r->scale);
     crm_copy(r->world, r->q_after, s->q0);
     crm_copy(r->world, r->v_after, s->v0);
-    r->stats.degenerate += s->degenerate;
     switch (s->end) {
     case CRM_END_FRAME: *left_bar = h_bar; break;
     case CRM_END_FRACTION: *left_bar = s->fraction * h_bar + (1 - s->fraction) * *left_bar; break;
@@ -193,8 +192,10 @@ static void add_bars(crm_reverse *r, int step, int n_bars, const carom_state_bar
     const carom_tape *t = r->tape;
     const carom_world *w = r->world;
     const double *v = carom_tape_v(t, step);
+    r->asked = 0;
     for (int i = 0; i < n_bars; i++) {
         if (bars[i].step != step) continue;
+        r->asked = 1;
         for (int k = 0; k < 3 * w->n_bodies; k++) {
             const int b = k / 3;
             const double q_bar = bars[i].q ? bars[i].q[k] : 0;
@@ -215,13 +216,15 @@ static void close_island(crm_reverse *r, const crm_record *first, double left_ba
 }
 
 /* The time owed after the last sub-step of an island: of all its bodies. */
-static double open_island(const crm_reverse *r, const crm_record *last)
+static carom_status open_island(crm_reverse *r, const crm_record *last, double *left_bar)
 {
-    double left_bar = 0;
+    *left_bar = 0;
     for (int k = 0; k < last->island.n_bodies; k++) {
-        left_bar += r->clock_bar[last->island.bodies[k]];
+        *left_bar += r->clock_bar[last->island.bodies[k]];
     }
-    return left_bar;
+    if (!r->asked || last->s.end != CRM_END_EVENT) return CAROM_OK;
+    return crm_kinks_add(&r->tape->memory, &r->kinks, r->frame + 1, &last->s.event,
+                         CAROM_KINK_BORDER);
 }
 
 static carom_status reverse_frame(crm_reverse *r, int frame)
@@ -229,17 +232,19 @@ static carom_status reverse_frame(crm_reverse *r, int frame)
     const carom_tape *t = r->tape;
     const int first = t->frames[frame].first_record;
     const int end = crm_frame_end(t, frame);
-    const int before = r->stats.degenerate;
     double *steps = r->sink.g.force_steps;
     if (steps) steps += 3 * (size_t)r->world->n_bodies * (size_t)(frame - r->from);
     r->sink.force_step = steps;
     const crm_record *records = t->records;
     double left_bar = 0;
+    r->frame = frame;
+    r->kinks.n = 0;
     clear(r->clock_old, (size_t)r->world->n_bodies);
     for (int k = end - 1; k >= first; k--) {
         const crm_record *x = &records[k];
-        if (k == end - 1 || records[k + 1].which != x->which) left_bar = open_island(r, x);
-        const carom_status e = reverse_record(r, k, &left_bar);
+        carom_status e = CAROM_OK;
+        if (k == end - 1 || records[k + 1].which != x->which) e = open_island(r, x, &left_bar);
+        if (e >= 0) e = reverse_record(r, k, &left_bar);
         if (e < 0) return e;
         if (x->s.map == CRM_MAP_EXTRAPOLATED) k -= x->s.n_inner; /* those before it are its own */
         if (k == first || records[k - 1].which != x->which) close_island(r, x, left_bar);
@@ -247,8 +252,9 @@ static carom_status reverse_frame(crm_reverse *r, int frame)
     double *const swap = r->clock_bar;
     r->clock_bar = r->clock_old;
     r->clock_old = swap;
-    if (r->stats.degenerate > before) r->stats.first_degenerate_step = frame + 1;
-    return CAROM_OK;
+    r->stats.degenerate += r->kinks.n;
+    if (r->kinks.n) r->stats.first_degenerate_step = frame + 1;
+    return r->kinks_met;
 }
 
 static void start(crm_reverse *r)
@@ -311,6 +317,7 @@ carom_status crm_gradient_span(carom_tape *t, int from, int to, int n_bars,
     if (!e) e = reverse_span(&r, n_bars, bars);
     r.stats.solves += r.clockwork.stats.solves;
     crm_free(&t->memory, r.block, r.bytes, 1);
+    crm_kinks_free(&t->memory, &r.kinks);
     if (r.clockwork.block) crm_forward_close(&r.clockwork);
     if (e < 0) return crm_world_fail(t->world, e, "gradient: %s", carom_status_text(e));
     if (stats) *stats = r.stats;

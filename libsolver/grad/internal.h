@@ -85,6 +85,21 @@ typedef struct crm_unpacked {
     double *solve_q[CRM_MAX_SOLVES], *solve_v[CRM_MAX_SOLVES];
 } crm_unpacked;
 
+/* Kinks of the step under way, each once. */
+typedef struct crm_kinks {
+    int n, max;
+    carom_kink *list;
+} crm_kinks;
+
+/* kinks.c */
+carom_status crm_kinks_add(crm_memory *m, crm_kinks *to, int step, const crm_contact *c,
+                           carom_kink_kind kind);
+/* Those of a solve whose problem is in place. */
+carom_status crm_kinks_of_solve(const carom_world *w, crm_memory *m, crm_kinks *to, int step,
+                                const crm_substep *s, const crm_solve *c,
+                                const carom_contact_problem *p);
+void crm_kinks_free(crm_memory *m, crm_kinks *x);
+
 /* What the rows at the end of a stage 1 have more than those at its start, 6 numbers each: an
  * iteration answers a change x of its velocity with right-hand sides that change by these times x.
  */
@@ -130,6 +145,7 @@ typedef struct crm_forward {
     crm_line *lines; /* n, and one that moves by h alone */
     int from;        /* the frame that the pass begins with */
     int frame;       /* under way */
+    int asked;       /* 1: for a state after it */
     int record;      /* under way */
     crm_problem_dot dot;
     crm_turn turn;
@@ -144,6 +160,8 @@ typedef struct crm_forward {
     crm_unpacked work, inner;
     void *block;
     size_t bytes;
+    crm_kinks kinks;
+    carom_status kinks_met; /* of noting them */
     carom_gradient_stats stats;
 } crm_forward;
 
@@ -165,13 +183,17 @@ typedef struct crm_reverse {
     carom_contact_solution solution; /* likewise */
     crm_turn turn;
     int wants_shapes, wants_joints; /* 1: radii or vertices; anchors, axes, angles or lengths */
-    double *solve_bar;           /* 3 n_bodies: cotangent of the velocity of the solve under way */
-    double *late_bar;            /* 3 n_bodies: of v0, through the springs of stage 2 */
-    double *pose;                /* 3 n_bodies: end of an iteration of stage 1 */
-    double *pose_bar;            /* 3 n_bodies: its cotangent */
-    double *rest;                /* 3 n_bodies: what the passes of stage 1 have left to do */
-    double *spare_q, *spare_v;   /* 3 n_bodies: for cotangents that do not count */
-    crm_contact *moved;          /* contacts at the pose of the problem under way */
+    double *solve_bar;         /* 3 n_bodies: cotangent of the velocity of the solve under way */
+    double *late_bar;          /* 3 n_bodies: of v0, through the springs of stage 2 */
+    double *pose;              /* 3 n_bodies: end of an iteration of stage 1 */
+    double *pose_bar;          /* 3 n_bodies: its cotangent */
+    double *rest;              /* 3 n_bodies: what the passes of stage 1 have left to do */
+    double *spare_q, *spare_v; /* 3 n_bodies: for cotangents that do not count */
+    crm_contact *moved;        /* contacts at the pose of the problem under way */
+    int frame;                 /* under way */
+    int asked;                 /* 1: for a state after it */
+    crm_kinks kinks;
+    carom_status kinks_met;      /* of noting them */
     int record;                  /* under way */
     crm_unpacked work, inner;    /* the sub-step under way, and one within it */
     double *column_q, *column_v; /* 3 n_bodies: cotangents within a column of an extrapolated map */
@@ -364,6 +386,9 @@ void crm_give_state(const crm_forward *f, const crm_line *line, const carom_stat
 void crm_forward_close(crm_forward *f);
 /* The line behind the others, at rest but for h. */
 crm_line *crm_begin_clockwork(const crm_forward *f);
+/* (q1, v1) of a record of the frame under way, unpacked into s: where the next one of its island
+ * begins, or the end of the step.  end: behind the frame's last record. */
+void crm_end_of(const crm_forward *f, int record, int end, crm_substep *s);
 /* Change of the indicator that ended the sub-step, at the changed (q1, v1) of the line. */
 double crm_event_jvp(const crm_forward *f, const crm_substep *s, const crm_line *line);
 

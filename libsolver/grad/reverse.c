@@ -10,6 +10,9 @@ void crm_pose_solve(crm_reverse *r, crm_substep *s, const crm_solve *c)
     crm_gather(w, c->v, w->rows.v);
     const carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
     r->solution = x;
+    const carom_status e =
+        crm_kinks_of_solve(w, &r->tape->memory, &r->kinks, r->frame + 1, s, c, &r->problem);
+    if (e < 0) r->kinks_met = e;
 }
 
 carom_status crm_sides_vjp(crm_reverse *r, const double *v_bar, double tol)

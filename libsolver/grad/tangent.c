@@ -103,8 +103,8 @@ static carom_status locate_jvp(crm_forward *f, crm_substep *s)
     if (e < 0) return e;
     const double slope = crm_event_jvp(f, s, clock);
     if (fabs(slope) <= crm_grazing(w, s)) {
-        f->stats.degenerate++;
-        return CAROM_OK;
+        return crm_kinks_add(&f->tape->memory, &f->kinks, f->frame + 1, &s->event,
+                             CAROM_KINK_GRAZING);
     }
     for (int i = 0; i < f->n; i++) {
         crm_line *line = &f->lines[i];
@@ -127,8 +127,7 @@ static void share_time(const crm_forward *f, const crm_substep *s)
     }
 }
 
-/* The state after the record: where the next one of its island begins, or the end of the step. */
-static void end_of(const crm_forward *f, int record, int end, crm_substep *s)
+void crm_end_of(const crm_forward *f, int record, int end, crm_substep *s)
 {
     const carom_tape *t = f->tape;
     const crm_record *next = &t->records[record + 1];
@@ -146,8 +145,7 @@ static carom_status forward_record(crm_forward *f, int record, int end)
     crm_substep *s = &f->work.s;
     f->record = record;
     crm_unpack(f->world, &f->tape->records[record], f->moved, &f->work);
-    end_of(f, record, end, s);
-    f->stats.degenerate += s->degenerate;
+    crm_end_of(f, record, end, s);
     if (s->end == CRM_END_EVENT || s->end == CRM_END_STOP) return locate_jvp(f, s);
     share_time(f, s);
     return crm_substep_jvp(f, s, f->n);
@@ -163,7 +161,7 @@ static void open_island(const crm_forward *f, const crm_record *first)
 }
 
 /* What is left after the last one all its bodies owe. */
-static void close_island(const crm_forward *f, const crm_record *last)
+static carom_status close_island(crm_forward *f, const crm_record *last)
 {
     for (int i = 0; i < f->n; i++) {
         crm_line *line = &f->lines[i];
@@ -171,6 +169,9 @@ static void close_island(const crm_forward *f, const crm_record *last)
             line->clock[last->island.bodies[k]] = line->left;
         }
     }
+    if (!f->asked || last->s.end != CRM_END_EVENT) return CAROM_OK;
+    return crm_kinks_add(&f->tape->memory, &f->kinks, f->frame + 1, &last->s.event,
+                         CAROM_KINK_BORDER);
 }
 
 static void turn_clocks(const crm_forward *f)
@@ -190,22 +191,22 @@ carom_status crm_forward_frame(crm_forward *f, int frame)
     const crm_record *records = t->records;
     const int first = t->frames[frame].first_record;
     const int end = crm_frame_end(t, frame);
-    const int before = f->stats.degenerate;
     f->frame = frame;
+    f->kinks.n = 0;
     turn_clocks(f);
     for (int k = first; k < end; k++) {
         if (k == first || records[k - 1].which != records[k].which) open_island(f, &records[k]);
         if (records[k].inner) continue; /* the extrapolated one behind them takes them up */
-        const carom_status e = forward_record(f, k, end);
+        const int last = k + 1 == end || records[k + 1].which != records[k].which;
+        carom_status e = forward_record(f, k, end);
+        if (e >= 0 && last) e = close_island(f, &records[k]);
         if (e < 0) return e;
-        if (k + 1 == end || records[k + 1].which != records[k].which) {
-            close_island(f, &records[k]);
-        }
     }
-    if (f->stats.degenerate > before && f->stats.first_degenerate_step < 0) {
+    f->stats.degenerate += f->kinks.n;
+    if (f->kinks.n && f->stats.first_degenerate_step < 0) {
         f->stats.first_degenerate_step = frame + 1;
     }
-    return CAROM_OK;
+    return f->kinks_met;
 }
 
 void crm_give_state(const crm_forward *f, const crm_line *line, const carom_state_dot *to)
@@ -218,6 +219,13 @@ void crm_give_state(const crm_forward *f, const crm_line *line, const carom_stat
         if (to->q) to->q[k] = line->q[k] + owed * v[k];
         if (to->v) to->v[k] = line->v[k] + owed * a;
     }
+}
+
+static int asks(int n, const carom_state_dot *dots, int step)
+{
+    int any = 0;
+    for (int i = 0; i < n; i++) any |= dots[i].step == step;
+    return any;
 }
 
 /* The states after `step` steps that are asked for. */
@@ -261,6 +269,7 @@ carom_status crm_forward_open(crm_forward *f, carom_tape *tape, int n,
 void crm_forward_close(crm_forward *f)
 {
     crm_free(&f->tape->memory, f->block, f->bytes, 1);
+    crm_kinks_free(&f->tape->memory, &f->kinks);
 }
 
 static carom_status check(const carom_tape *t, int n, int n_dots, const carom_state_dot *dots)
@@ -287,6 +296,7 @@ carom_status carom_tape_tangent(carom_tape *tape, int n_directions,
     if (e >= 0) give_states(&f, 0, n_dots, dots);
     for (int frame = 0; e >= 0 && frame < tape->n_frames; frame++) {
         e = crm_hold_segment(tape, frame);
+        f.asked = asks(n_directions * n_dots, dots, frame + 1);
         if (e >= 0) e = crm_forward_frame(&f, frame);
         if (e >= 0) give_states(&f, frame + 1, n_dots, dots);
     }

@@ -34,6 +34,7 @@ void crm_gradient_prepare(crm_gradient *g, const crm_scene *scene)
 void crm_gradient_free(crm_gradient *g)
 {
     for (int a = 0; a < CRM_N_WRT; a++) free(g->x[a]);
+    free(g->kinks);
     memset(g, 0, sizeof *g);
 }
 
@@ -111,6 +112,14 @@ static int run_backward(crm_gradient *g, const crm_run *run, const crm_loss *los
     return CRM_DONE;
 }
 
+/* All kinks by name; without memory or a walk none. */
+static void name_kinks(crm_gradient *g, carom_tape *tape)
+{
+    if (carom_tape_kinks(tape, 0, NULL, &g->n_kinks) < 0) g->n_kinks = 0;
+    g->kinks = crm_resize(NULL, (size_t)g->n_kinks, sizeof *g->kinks);
+    carom_tape_kinks(tape, g->n_kinks, g->kinks, &g->n_kinks);
+}
+
 int crm_gradient_compute(crm_gradient *g, const crm_run *run, const crm_loss *loss, int quiet)
 {
     carom_tape *tape = NULL;
@@ -124,6 +133,7 @@ int crm_gradient_compute(crm_gradient *g, const crm_run *run, const crm_loss *lo
         code = run_forward(g, run, loss, w, tape, quiet);
     }
     if (code == CRM_DONE) code = run_backward(g, run, loss, tape);
+    if (code == CRM_DONE && g->name_kinks) name_kinks(g, tape);
     carom_tape_destroy(tape);
     carom_world_destroy(w);
     return code;

@@ -2,6 +2,7 @@
 #ifndef CRM_GRADIENT_H
 #define CRM_GRADIENT_H
 
+#include "carom/grad.h"
 #include "gradient/loss.h"
 #include "io/load.h"
 
@@ -27,6 +28,9 @@ extern const char *const crm_wrt_names[CRM_N_WRT + 1];
 typedef struct crm_gradient {
     double loss;
     int degenerate;
+    int name_kinks; /* 1: fill kinks */
+    int n_kinks;
+    carom_kink *kinks;
     double seconds_forward;
     double seconds_backward;
     int wanted[CRM_N_WRT];

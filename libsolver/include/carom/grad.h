@@ -71,9 +71,31 @@ typedef struct carom_gradient {
     double *motor_limit;     /* n_joints */
 } carom_gradient;
 
+/* Where a run has two one-sided derivatives; what is said to be taken is that of the recorded
+ * modes.
+ */
+typedef enum carom_kink_kind {
+    CAROM_KINK_WEAK,         /* a contact touches without force: as recorded, closed or open */
+    CAROM_KINK_SLIP,         /* it sticks at the limit of friction: as recorded */
+    CAROM_KINK_SIMULTANEOUS, /* several contacts of a body close at one time: all at once */
+    CAROM_KINK_GRAZING,      /* a gap closes, or a slip ends, at no speed: at a constant time */
+    CAROM_KINK_BORDER,       /* the step ends with an impact: its end is the state before that */
+    CAROM_KINK_FEATURES      /* two features of a pair are as near: that of the recorded contact */
+} carom_kink_kind;
+/* "weak", "slip", "simultaneous", "grazing", "border", "features"; NULL for any other number. */
+CAROM_API const char *carom_kink_name(carom_kink_kind kind);
+
+typedef struct carom_kink {
+    int step;   /* 1: the first */
+    int body_a; /* of the contact, or of the joint whose limit it is */
+    int body_b;
+    carom_kink_kind kind;
+} carom_kink;
+
 /* What a pass over the tape has met and done. */
 typedef struct carom_gradient_stats {
-    int degenerate;            /* contacts at kinks, all sub-steps: a one-sided element was taken */
+    int degenerate;            /* kinks on the way, but for ties of features, which cost a search;
+                                * borders where a state was asked for */
     int first_degenerate_step; /* -1: none */
     long solves;               /* contact problems differentiated, per direction */
 } carom_gradient_stats;
@@ -85,6 +107,11 @@ CAROM_API carom_status carom_tape_gradient(carom_tape *tape, int n_bars,
                                            const carom_state_bar *bars,
                                            const carom_gradient *gradient,
                                            carom_gradient_stats *stats);
+
+/* All kinks of the recorded steps, each once per step, pair and kind, in order: *count of them, the
+ * first `capacity` into kinks (may be NULL when 0). */
+CAROM_API carom_status carom_tape_kinks(carom_tape *tape, int capacity, carom_kink *kinks,
+                                        int *count);
 
 /* Change of the state after `step` steps: 3 n_bodies each, overwritten; NULL: not wanted. */
 typedef struct carom_state_dot {
