@@ -43,14 +43,11 @@ static void add_body(carom_world *w, const scene *s, int k)
     must(w, carom_world_add_body(w, &d, NULL));
 }
 
-carom_world *own_build(const scene *s, carom_integrator integrator, int order)
+static carom_world *build(const scene *s, carom_world_settings set)
 {
-    carom_world_settings set = carom_world_defaults();
     carom_world *w = NULL;
     set.dt = s->dt;
     set.gravity[1] = -s->gravity;
-    set.integrator = (int)integrator;
-    set.order = order;
     must(NULL, carom_world_create(&set, NULL, &w));
     for (int k = 0; k < s->n_bodies; k++) add_body(w, s, k);
     for (int k = 0; k < s->n_pins; k++) {
@@ -61,9 +58,32 @@ carom_world *own_build(const scene *s, carom_integrator integrator, int order)
     return w;
 }
 
+static carom_world_settings settings(carom_integrator integrator, int order)
+{
+    carom_world_settings set = carom_world_defaults();
+    set.integrator = (int)integrator;
+    set.order = order;
+    return set;
+}
+
+carom_world *own_build(const scene *s, carom_integrator integrator, int order)
+{
+    return build(s, settings(integrator, order));
+}
+
 void *own_create(const scene *s, carom_integrator integrator, int order)
 {
     carom_world *w = own_build(s, integrator, order);
+    must(w, carom_world_seal(w));
+    return w;
+}
+
+void *own_create_with(const scene *s, carom_integrator integrator, int order, const char *name,
+                      const char *value)
+{
+    carom_world_settings set = settings(integrator, order);
+    must(NULL, carom_world_settings_set(&set, name, value, NULL));
+    carom_world *w = build(s, set);
     must(w, carom_world_seal(w));
     return w;
 }

@@ -10,5 +10,8 @@
 carom_world *own_build(const scene *s, carom_integrator integrator, int order);
 /* A sealed world of the scene; a failure ends the program. */
 void *own_create(const scene *s, carom_integrator integrator, int order);
+/* The same with one more setting by name. */
+void *own_create_with(const scene *s, carom_integrator integrator, int order, const char *name,
+                      const char *value);
 
 #endif

@@ -31,7 +31,7 @@ typedef struct scene_polygon {
     double (*corners)[2];
 } scene_polygon;
 
-enum { MAX_PINS = 256, MAX_CORNERS = 64 };
+enum { MAX_PINS = 4096, MAX_CORNERS = 64 };
 
 typedef struct scene {
     const char *name;
@@ -50,6 +50,13 @@ enum { N_SCENES = 11 };
 /* Scene k, 0 <= k < N_SCENES; memory exhausted ends the program. */
 scene make_scene(int k);
 void free_scene(scene *s);
+
+/* Scenes that grow: free bodies, chain, stack, pyramid, pile, islands (stacks of four apart from
+ * each other), hub (arms pinned to one heavy disc). */
+enum { N_FAMILIES = 7 };
+extern const char *const FAMILY_NAMES[N_FAMILIES];
+/* Family k of about n bodies; n_bodies is 0 where it cannot be so large. */
+scene make_family(int k, int n);
 
 /* What a step was, where the contender says so. */
 typedef struct counters {

@@ -108,9 +108,9 @@ static scene chain(const char *name, int n)
     return s;
 }
 
-static scene stack(int n)
+static scene stack(const char *name, int n)
 {
-    scene s = empty("stack of 10 at rest", 1, 60, 240);
+    scene s = empty(name, 1, 60, 240);
     add(&s, slab(0, -1, 20, 1, 0));
     for (int k = 0; k < n; k++) add(&s, box(0, k + 0.5, 0.5, 0.5));
     return s;
@@ -129,9 +129,9 @@ static scene pyramid(const char *name, int base, int n_steps)
 }
 
 /* 25 columns of discs with some play fall into a box. */
-static scene pile(int n)
+static scene pile(const char *name, int n)
 {
-    scene s = empty("pile of 1000 discs settling", 0, 0, 240);
+    scene s = empty(name, 0, 0, 240);
     const double r = 0.1;
     const int n_columns = 25;
     const double w = n_columns * 2.2 * r;
@@ -148,9 +148,9 @@ static scene pile(int n)
     return s;
 }
 
-static scene many_free(int n)
+static scene many_free(const char *name, int n)
 {
-    scene s = empty("1e5 free bodies", 0, 5, 20);
+    scene s = empty(name, 0, 5, 20);
     const int side = (int)sqrt(n);
     for (int k = 0; k < n; k++) {
         const int b = add(&s, disc(3 * (k % side), 3 * (k / side), 0.5, 0));
@@ -168,12 +168,60 @@ scene make_scene(int k)
     case 2: return two_bodies();
     case 3: return chain("pendulum", 1);
     case 4: return chain("chain of 10", 10);
-    case 5: return stack(10);
+    case 5: return stack("stack of 10 at rest", 10);
     case 6: return pyramid("pyramid 20 at rest", 20, 60);
     case 7: return pyramid("pyramid 50 at rest", 50, 30);
     case 8: return pyramid("pyramid 100 at rest", 100, 10);
-    case 9: return pile(1000);
-    default: return many_free(100000);
+    case 9: return pile("pile of 1000 discs settling", 1000);
+    default: return many_free("1e5 free bodies", 100000);
+    }
+}
+
+static scene islands(int n)
+{
+    scene s = empty("islands", 1, 60, 240);
+    const int columns = n / 4 > 1 ? n / 4 : 1;
+    add(&s, slab(1.5 * columns, -1, 1.5 * columns + 20, 1, 0));
+    for (int c = 0; c < columns; c++) {
+        for (int k = 0; k < 4 && c * 4 + k < n; k++) add(&s, box(3 * c, k + 0.5, 0.5, 0.5));
+    }
+    return s;
+}
+
+/* Arms of 1 m around a disc that turns. */
+static scene hub(int n)
+{
+    scene s = empty("hub", 0, 0, 240);
+    if (n > MAX_PINS) return s;
+    const double radius = 1 + 0.05 * n;
+    const int center = add(&s, disc(0, 0, radius, 0));
+    s.gravity = 0;
+    s.bodies[center].v[0] = 1;
+    for (int k = 1; k < n; k++) {
+        const double a = 2 * 3.14159265358979323846 * k / (n - 1);
+        scene_body b = box((radius + 0.5) * cos(a), (radius + 0.5) * sin(a), 0.5, 0.02);
+        b.q[0] = a;
+        const int arm = add(&s, b);
+        pin(&s, center, arm, radius * cos(a), radius * sin(a));
+    }
+    return s;
+}
+
+const char *const FAMILY_NAMES[N_FAMILIES] = {"free", "chain",   "stack", "pyramid",
+                                              "pile", "islands", "hub"};
+
+scene make_family(int k, int n)
+{
+    const scene none = empty(FAMILY_NAMES[k], 0, 0, 0);
+    const int base = (int)(0.5 * (sqrt(8.0 * n + 1) - 1) + 0.5);
+    switch (k) {
+    case 0: return many_free("free", n);
+    case 1: return n > MAX_PINS ? none : chain("chain", n);
+    case 2: return stack("stack", n);
+    case 3: return pyramid("pyramid", base, 60);
+    case 4: return pile("pile", n);
+    case 5: return islands(n);
+    default: return hub(n);
     }
 }
 
