@@ -11,8 +11,8 @@ static scene make(const char *name)
     scene s = {0};
     s.name = name;
     s.gravity = G;
-    s.max_bodies = 16;
-    s.bodies = calloc(16, sizeof *s.bodies);
+    s.max_bodies = 256;
+    s.bodies = calloc(256, sizeof *s.bodies);
     if (!s.bodies) abort();
     return s;
 }
@@ -150,8 +150,110 @@ static problem rocking(void)
     return p;
 }
 
+/* What stands stays: the error is how far one body has moved. */
+static problem rest(const char *name, int body)
+{
+    problem p = {name, make(name), 2.0, body, 0.5, 0, {0}};
+    floor_at_zero(&p.s, 0.5, 0);
+    return p;
+}
+
+static void stays(problem *p)
+{
+    const double *q = p->s.bodies[p->body].q;
+    end_at(p, q[0], q[1], q[2]);
+}
+
+/* A box on a slope that friction holds, at 0.98 of the angle of friction. */
+static problem incline(void)
+{
+    problem p = rest("incline at 0.98", 1);
+    const double a = atan(0.98 * 0.5);
+    p.s.bodies[0].q[0] = a;
+    p.s.bodies[0].q[1] = sin(a);
+    p.s.bodies[0].q[2] = -cos(a);
+    box(&p.s, 0.5, 0.25, a, -0.25 * sin(a), 0.25 * cos(a), 0.5);
+    stays(&p);
+    return p;
+}
+
+/* Five balls of one mass with small gaps, e = 1, no gravity: they exchange their speeds, so that
+ * the last one ends where the first would be, had it gone through, and each stands where the one
+ * behind it was when they met. */
+static problem cradle(void)
+{
+    static const double gap = 0.01;
+    problem p = {"cradle with gaps", make("cradle"), 1.0, 4, 0.25, 0, {0}};
+    p.s.gravity = 0;
+    for (int k = 0; k < 5; k++) disc(&p.s, 0.25, (0.5 + gap) * k, 0, 0, 1);
+    p.s.bodies[0].v[1] = 2;
+    end_at(&p, 0, p.s.bodies[4].q[1] + 2 - 4 * gap, 0);
+    return p;
+}
+
+static problem stack(const char *name, int n)
+{
+    problem p = rest(name, n);
+    for (int k = 0; k < n; k++) box(&p.s, 0.5, 0.5, 0, 0, k + 0.5, 0.5);
+    stays(&p);
+    return p;
+}
+
+/* Each box `ratio` times as heavy as the one below. */
+static problem tower(const char *name, int n, double ratio)
+{
+    problem p = stack(name, n);
+    double m = 1;
+    for (int k = 1; k <= n; k++, m *= ratio) {
+        p.s.bodies[k].mass = m;
+        p.s.bodies[k].inertia = m / 6;
+    }
+    return p;
+}
+
+static problem pyramid(void)
+{
+    problem p = rest("pyramid 20", 210);
+    for (int row = 0; row < 20; row++) {
+        for (int k = 0; k < 20 - row; k++) {
+            box(&p.s, 0.45, 0.5, 0, k - 0.5 * (19 - row), row + 0.5, 0.5);
+        }
+    }
+    stays(&p);
+    return p;
+}
+
+/* A ball 1e4 times as heavy as a link hangs on a hundred links. */
+static problem heavy_chain(void)
+{
+    problem p = {"heavy ball on 100 links", make("heavy chain"), 1.0, 0, 0.5, 0, {0}};
+    const int last = links(&p.s, 100, 0, 0);
+    const scene_pin pin = {last, last + 1, 0, -100};
+    p.body = disc(&p.s, 0.5, 0, -100.5, 0, 0);
+    p.s.bodies[p.body].mass = 1e4 * p.s.bodies[last].mass;
+    p.s.bodies[p.body].inertia = 0.125 * p.s.bodies[p.body].mass;
+    p.s.pins[p.s.n_pins++] = pin;
+    stays(&p);
+    return p;
+}
+
+static problem make_rest(int k)
+{
+    switch (k) {
+    case 0: return incline();
+    case 1: return cradle();
+    case 2: return stack("stack of 10", 10);
+    case 3: return stack("stack of 100", 100);
+    case 4: return tower("mass ratio 1e3", 2, 1e3);
+    case 5: return tower("tower 1 to 1e6", 7, 10);
+    case 6: return pyramid();
+    default: return heavy_chain();
+    }
+}
+
 problem make_problem(int k)
 {
+    if (k >= 9) return make_rest(k - 9);
     switch (k) {
     case 0: return sliding_stop();
     case 1: return slide_to_roll();

@@ -14,6 +14,6 @@ typedef struct problem {
     double exact[3]; /* (angle, x, y) */
 } problem;
 
-enum { N_PROBLEMS = 9 };
+enum { N_PROBLEMS = 17 };
 problem make_problem(int k);
 #endif

@@ -1,0 +1,70 @@
+"""carom beside every mark: cost [s per simulated second] at which an error is reached.
+
+usage: marks.py PRECISION_CSV OUTDIR  (writes marks.md)
+
+marks.csv holds the costs of the best of Box2D 2.4 and v3.2, pymunk, MuJoCo and Drake as they were
+measured on another day, in one run on a two-core machine, before carom was there; no row: none of them
+reached that error.  The peers of this run stand beside them: their ratio to carom's cost decides."""
+
+import csv
+import importlib.util
+import os
+import sys
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+HEAD = """# Marks
+
+Cost in processor seconds per simulated second at which an error is reached. *Mark*: the best of Box2D 2.4 and v3.2, pymunk 7.3, MuJoCo 4.0 and Drake 1.51, measured
+on another day on two cores of the same kind (`bench/report/marks.csv`); *peers*: the best of the peers of this run, the ratio to which decides; "-": not
+reached by any setting.
+
+| scene | error | mark | peers now | carom | by | carom over peers | |
+|---|---|---|---|---|---|---|---|
+"""
+
+
+def precision_plot():
+    path = os.path.join(HERE, "..", "precision", "plot.py")
+    spec = importlib.util.spec_from_file_location("precision_plot", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def verdict(mark, peers, own):
+    if own is None:
+        return "lost" if mark or peers else "open"
+    rival = peers if peers is not None else mark
+    return "won" if rival is None or own <= rival else "lost"
+
+
+def number(x):
+    return "-" if x is None else f"{x:.1e}"
+
+
+def main(path, out):
+    plot = precision_plot()
+    rows = plot.read(path)
+    with open(os.path.join(HERE, "marks.csv"), encoding="ascii") as file:
+        marks = list(csv.DictReader(file))
+    lines, won, lost = [], 0, 0
+    for m in marks:
+        level = float(m["level"])
+        own = plot.cheapest(rows, m["scene"], level, True)
+        peers = plot.cheapest(rows, m["scene"], level, False)
+        costs = [x[0] if x else None for x in (peers, own)]
+        word = verdict(float(m["cost"]), *costs)
+        won += word == "won"
+        lost += word == "lost"
+        ratio = f"{costs[1] / costs[0]:.2f}" if all(costs) else "-"
+        lines.append(f"| {m['scene']} | {m['level']} | {float(m['cost']):.1e} | {number(costs[0])} | "
+                     f"{number(costs[1])} | {own[1] if own else '-'} | {ratio} | {word} |")
+    closing = (f"\n{won} won, {lost} lost. Where the peers of this run do not reach an error, the mark stands for them.\n\n"
+               "Errors below these marks, and scenes with none, are in precision.md: carom alone reaches them.\n")
+    with open(os.path.join(out, "marks.md"), "w", encoding="ascii") as file:
+        file.write(HEAD + "\n".join(lines) + "\n" + closing)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2])

@@ -1,0 +1,225 @@
+"""Runs the benchmarks of carom piece by piece and writes their pages: `./dev report`.
+
+usage: report.py --bin FOLDER --work FOLDER --out FOLDER [--quick] [--again] [PART...]
+
+A part is made of pieces; what a piece prints is kept in the work folder, so that an interrupted run
+goes on where it was, and a part that is done is not repeated unless --again says so."""
+
+import argparse
+import datetime
+import glob
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+ROOT = os.path.dirname(os.path.dirname(HERE))
+
+N_PRECISION = 17
+GROWTH = ("free", "chain", "stack", "pyramid", "pile", "islands", "hub")
+
+
+def precision_pieces():
+    return [[str(k)] for k in range(N_PRECISION)]
+
+
+def growth_pieces():
+    return [[family] for family in GROWTH]
+
+
+def whole():
+    return [[]]
+
+
+# name: (program below the folder of benchmarks, its pieces, what it shows)
+PARTS = {
+    "precision": ("precision/bench_precision", precision_pieces, "error against run time"),
+    "growth": ("growth/bench_growth", growth_pieces, "time, memory and work against the number of bodies"),
+    "gradient": ("gradient/bench_gradient", whole, "cost and error of gradients"),
+    "stability": ("stability/bench_stability", whole, "the stability atlas"),
+    "leave_out": ("leave_out/bench_leave_out", whole, "what scenes do not need, and what that saves"),
+}
+
+
+class Stopped(Exception):
+    """A program failed or was interrupted; what was done is kept."""
+
+
+def say(text):
+    print(text, flush=True)
+
+
+def run_piece(command, path):
+    """The output of a command in path, whole or not at all."""
+    partial = path + ".partial"
+    with open(partial, "w", encoding="utf-8") as out, open(path + ".log", "w", encoding="utf-8") as log:
+        code = subprocess.run(command, stdout=out, stderr=log, check=False).returncode
+    # the atlas counts black cells in its code: its figures are whole all the same
+    if code < 0 or os.path.getsize(partial) == 0:
+        raise Stopped(f"{' '.join(command)} ended with {code}; see {path}.log")
+    os.replace(partial, path)
+
+
+def join(pieces, path):
+    """All pieces with the header of the first."""
+    with open(path, "w", encoding="utf-8") as out:
+        for k, piece in enumerate(pieces):
+            with open(piece, encoding="utf-8", errors="replace") as file:
+                lines = file.readlines()
+            header = next((i for i, line in enumerate(lines) if not line.startswith("#")), 0)
+            if k:
+                del lines[header]
+            out.writelines(lines)
+
+
+class Report:
+    def __init__(self, options):
+        self.options = options
+        self.kind = "quick" if options.quick else "full"
+        self.stamps = os.path.join(options.work, "parts.json")
+        self.done = {}
+        if os.path.exists(self.stamps):
+            with open(self.stamps, encoding="utf-8") as file:
+                self.done = json.load(file)
+
+    def remember(self, part, facts):
+        self.done[part] = facts
+        with open(self.stamps, "w", encoding="utf-8") as file:
+            json.dump(self.done, file, indent=1)
+
+    def is_done(self, part):
+        return self.done.get(part, {}).get("kind") == self.kind and not self.options.again
+
+    def program(self, part):
+        return os.path.join(self.options.bin, PARTS[part][0])
+
+    def run(self, part):
+        program, pieces, _ = PARTS[part]
+        if not os.path.exists(self.program(part)):
+            say(f"  {part:<12} left out: {program} is not built")
+            return
+        if self.is_done(part):
+            say(f"  {part:<12} done before; --again repeats it")
+            return
+        folder = os.path.join(self.options.work, f"{part}-{self.kind}")
+        if self.options.again:
+            shutil.rmtree(folder, ignore_errors=True)
+        os.makedirs(folder, exist_ok=True)
+        since = time.time()
+        files, commands = [], []
+        for k, arguments in enumerate(pieces()):
+            words = (["--quick"] if self.options.quick else []) + arguments
+            commands.append(" ".join([os.path.basename(program), *words]))
+            files.append(os.path.join(folder, f"{k:02d}.csv"))
+            self.progress(part, k, len(pieces()), arguments)
+            if not os.path.exists(files[-1]):
+                run_piece([self.program(part), *words], files[-1])
+        path = os.path.join(self.options.out, f"{part}.csv")
+        join(files, path)
+        self.plot(part, path)
+        seconds = time.time() - since
+        self.remember(part, {"kind": self.kind, "seconds": seconds, "commands": commands,
+                             "date": datetime.date.today().isoformat()})
+        say(f"  {part:<12} done in {seconds:.0f} s")
+
+    @staticmethod
+    def progress(part, k, n, arguments):
+        bar = "#" * (20 * k // n) + "." * (20 - 20 * k // n)
+        say(f"  {part:<12} [{bar}] {k}/{n} {' '.join(arguments)}")
+
+    def plot(self, part, path):
+        folder = os.path.join(ROOT, "bench", part)
+        scripts = [os.path.join(folder, "plot.py")]
+        if part == "precision":
+            scripts.append(os.path.join(HERE, "marks.py"))
+        for script in scripts:
+            if os.path.exists(script):
+                subprocess.run([sys.executable, script, path, self.options.out], check=True)
+
+    def page(self):
+        lines = ["# Reports", "",
+                 "Made by `./dev report`; nothing on these pages is written by hand. `--quick` takes minutes, the full run hours.", "",
+                 "| part | shows | run | date | took |", "|---|---|---|---|---|"]
+        for part, (_, _, shows) in PARTS.items():
+            facts = self.done.get(part)
+            page = f"[{part}]({part}.md)" if os.path.exists(os.path.join(self.options.out, f"{part}.md")) else part
+            if facts:
+                lines.append(f"| {page} | {shows} | {facts['kind']} | {facts['date']} | {facts['seconds']:.0f} s |")
+            else:
+                lines.append(f"| {page} | {shows} | not run | | |")
+        if os.path.exists(os.path.join(self.options.out, "marks.md")):
+            lines.append("| [marks](marks.md) | carom beside every mark of its peers | with precision | | |")
+        lines += ["", "## Machine and versions", "", *machine(), "", "## Commands", ""]
+        for part in PARTS:
+            for command in self.done.get(part, {}).get("commands", [])[:1]:
+                lines.append(f"* `{command}`" + (" and so on, piece by piece" if len(self.done[part]["commands"]) > 1 else ""))
+        with open(os.path.join(self.options.out, "README.md"), "w", encoding="ascii", errors="replace") as file:
+            file.write("\n".join(lines) + "\n")
+
+
+def output(*command):
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+def cpu():
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            return next(line.split(":", 1)[1].strip() for line in file if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or "unknown"
+
+
+def package(name):
+    return output("pkg-config", "--modversion", name)
+
+
+def machine():
+    return [
+        f"* {os.cpu_count()} cores, {cpu()}; {platform.system()} {platform.release()}, {platform.machine()}",
+        f"* carom {output('git', 'rev-parse', '--short', 'HEAD')}; {output('cc', '--version').splitlines()[0]}; Release",
+        f"* Box2D {package('box2d')}, Chipmunk {chipmunk()}; Python {platform.python_version()}",
+        "* Other programs may have run beside it: ratios within a run count, not seconds.",
+    ]
+
+
+def chipmunk():
+    found = glob.glob("/usr/lib/*/libchipmunk.so.7*")
+    return os.path.basename(max(found, default="unknown", key=len)).replace("libchipmunk.so.", "")
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="./dev report")
+    parser.add_argument("--bin", required=True)
+    parser.add_argument("--work", required=True)
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--again", action="store_true")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS))
+    options = parser.parse_args()
+    unknown = [p for p in options.parts if p not in PARTS]
+    if unknown:
+        parser.error(f"no such part: {', '.join(unknown)}; there are {', '.join(PARTS)}")
+    os.makedirs(options.work, exist_ok=True)
+    os.makedirs(options.out, exist_ok=True)
+    report = Report(options)
+    try:
+        for part in options.parts or PARTS:
+            report.run(part)
+    except (Stopped, KeyboardInterrupt) as stop:
+        say(f"stopped: {stop or 'interrupted'}; the same command goes on from here")
+        return 1
+    finally:
+        report.page()
+    say(f"pages: {options.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
