@@ -138,6 +138,8 @@ static void explain_plan(FILE *f, const carom_plan *p)
              "motion is free: no solve, no matrix");
     plan_row(f, "located impacts", p->located, "times of impacts are sought",
              "nothing is sought within a step");
+    plan_row(f, "located changes", p->changes, "times at which contacts open or begin to slip",
+             "no such times are sought");
     plan_row(f, "higher order", p->extrapolated, "sub-steps are extrapolated", "order 2, or 1");
     plan_row(f, "sensors", p->sensors, "seen by queries alone", "none");
     plan_row(f, "threads", p->threads, "islands are shared among threads", "one thread");

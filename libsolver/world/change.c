@@ -1,5 +1,5 @@
-/* change.c: the time at which a contact opens or begins to slip, for orders above 2.  docs/step.md,
- * section "Higher orders". */
+/* change.c: the time at which a contact opens or begins to slip.  docs/step.md, section "Contacts
+ * that open or begin to slip". */
 #include "world/internal.h"
 
 #include <math.h>
@@ -12,8 +12,9 @@ static const double RATE_STEP = 1e-4;
  * not jump, so an error d of the time moves the end by d^3: this is more than enough for order 8.
  */
 static const double FORCE_TOL = 1e-9;
-/* Changes that are looked for before the earliest is believed. */
-enum { MAX_CHANGES = 6 };
+/* Changes that are looked for before the earliest is believed; contacts beyond which they are too
+ * many to be told apart. */
+enum { MAX_CHANGES = 6, MAX_CONTACTS = 32 };
 
 /* What ends: the pressing of contact k, or its sticking on the side where l_t = sign mu l_n. */
 typedef struct change {
@@ -25,6 +26,15 @@ typedef struct change {
 static crm_solve *scratch(crm_substep *s)
 {
     return &s->solve[CRM_MAX_SOLVES - 1];
+}
+
+/* Number n of the list of margins at the start, three per contact at most: in arrays of the solve
+ * before the scratch. */
+static double *start_margin(crm_substep *s, int n)
+{
+    crm_solve *c = &s->solve[CRM_MAX_SOLVES - 2];
+    double *const lists[3] = {c->cn, c->ct, c->ln};
+    return &lists[n / s->n_contacts][n % s->n_contacts];
 }
 
 /* d(J v)/dt at constant v of all rows, by central differences over q +- tau v, into cn, ct, ce. */
@@ -125,10 +135,10 @@ static int next_change(const carom_world *w, change *x)
 }
 
 /* Margins in the order of next_change. */
-static void margins(const carom_world *w, double *list)
+static void keep_margins(carom_world *w)
 {
     int n = 0;
-    for (change x = {-1, 1}; next_change(w, &x);) list[n++] = margin(w, &x);
+    for (change x = {-1, 1}; next_change(w, &x);) *start_margin(&w->sub, n++) = margin(w, &x);
 }
 
 /* A force below this is none: of weights, other free forces, and what bends the ways over L. */
@@ -147,17 +157,17 @@ static double least_force(const carom_world *w, const double *v)
 }
 
 /* The change whose straight line meets zero first by the end; 0: none. */
-static int first_change(const carom_world *w, const double *start, double tol, change *found,
-                        double *g0, double *g1)
+static int first_change(carom_world *w, double tol, change *found, double *g0, double *g1)
 {
     double soonest = HUGE_VAL;
     int n = 0;
     for (change x = {-1, 1}; next_change(w, &x); n++) {
         const double end = margin(w, &x);
-        if (end >= -tol || start[n] <= tol || start[n] / (start[n] - end) >= soonest) continue;
-        soonest = start[n] / (start[n] - end);
+        const double start = *start_margin(&w->sub, n);
+        if (end >= -tol || start <= tol || start / (start - end) >= soonest) continue;
+        soonest = start / (start - end);
         *found = x;
-        *g0 = start[n];
+        *g0 = start;
         *g1 = end;
     }
     return soonest < HUGE_VAL;
@@ -167,18 +177,17 @@ static int first_change(const carom_world *w, const double *start, double tol, c
 static carom_status find_change(carom_world *w, double h, int *found)
 {
     crm_substep *s = &w->sub;
-    double *start = scratch(s)->v; /* room for three margins per contact: checked by the caller */
     *found = 0;
     carom_status e = forces(w, s->q0, s->v0);
     if (e < 0) return e;
-    margins(w, start);
+    keep_margins(w);
     const double tol = least_force(w, s->v0);
     e = crm_map_run(w, h);
     for (int round = 0; e >= 0 && round < MAX_CHANGES; round++) {
         search f = {w, {0, 0}};
         crm_indicator g = {margin_left, &f, 0, 0, tol};
         e = forces(w, s->q1, s->v1);
-        if (e < 0 || !first_change(w, start, tol, &f.x, &g.start, &g.end)) return e;
+        if (e < 0 || !first_change(w, tol, &f.x, &g.start, &g.end)) return e;
         e = crm_find_root(w, &g, &h);
         *found = e >= 0;
     }
@@ -193,11 +202,8 @@ static carom_status overdue(carom_world *w, int *any)
     const carom_status e = forces(w, s->q1, s->v1);
     *any = 0;
     if (e < 0) return e;
-    double *end = scratch(s)->v;
     const double tol = least_force(w, s->v1);
-    margins(w, end);
-    int n = 0;
-    for (change x = {-1, 1}; next_change(w, &x); n++) *any |= end[n] < -tol;
+    for (change x = {-1, 1}; next_change(w, &x);) *any |= margin(w, &x) < -tol;
     return e;
 }
 
@@ -211,6 +217,38 @@ static int lets_go(const crm_substep *s)
     return 0;
 }
 
+/* The forces of a smooth map at its end as its two stages go on, l2 + (l2 - l1) / 2: whether
+ * contact k would have to pull, or to slip.  One that differs between the stages has changed. */
+static int is_suspect(const carom_world *w, const crm_substep *s, int k)
+{
+    const crm_solve *a = &s->solve[0];
+    const crm_solve *b = &s->solve[1];
+    const double n = 1.5 * b->ln[k] - 0.5 * a->ln[k];
+    const double t = 1.5 * b->lt[k] - 0.5 * a->lt[k];
+    if (a->mode[k] != b->mode[k]) return 1;
+    if (a->mode[k] == CAROM_SEPARATED) return 0;
+    return n < 0 || (a->mode[k] == CAROM_STICK && w->rows.mu[k] > 0 && fabs(t) > w->rows.mu[k] * n);
+}
+
+/* Whether it is worth the forces at the end to know if something changes. */
+static int may_change(const carom_world *w, const crm_substep *s)
+{
+    if (s->map == CRM_MAP_EXTRAPOLATED) return 1;
+    for (int k = 0; k < s->n_contacts; k++) {
+        if (is_suspect(w, s, k)) return 1;
+    }
+    return 0;
+}
+
+static int is_mixed(const crm_substep *s)
+{
+    if (s->map == CRM_MAP_EXTRAPOLATED) return s->finest;
+    for (int k = 0; k < s->n_contacts; k++) {
+        if (s->solve[0].mode[k] != s->solve[1].mode[k]) return 1;
+    }
+    return 0;
+}
+
 carom_status crm_locate_change(carom_world *w, double left)
 {
     crm_substep *s = &w->sub;
@@ -219,11 +257,13 @@ carom_status crm_locate_change(carom_world *w, double left)
     const double fraction = s->fraction;
     const crm_contact event = s->event;
     int found = 0;
-    if (s->map != CRM_MAP_EXTRAPOLATED || !s->n_contacts) return CAROM_OK;
-    if (s->n_contacts > w->n_bodies) return CAROM_OK; /* a crowd: no room for margins */
+    if (!w->plan.changes || s->map == CRM_MAP_EULER || s->map == CRM_MAP_IMPACT) return CAROM_OK;
+    if (!s->n_contacts || s->ahead) return CAROM_OK;
+    if (s->n_contacts > MAX_CONTACTS) return CAROM_OK;
     if (w->island->n_driven) return CAROM_OK; /* springs and motors are not among its forces */
-    const int opens = s->finest || lets_go(s);
+    const int opens = is_mixed(s) || lets_go(s);
     int any = 0;
+    if (!opens && !may_change(w, s)) return CAROM_OK;
     carom_status e = opens ? CAROM_OK : overdue(w, &any);
     if (e < 0 || (!opens && !any)) return e;
     if (!opens || modes_at_start(w, h)) e = find_change(w, h, &found);

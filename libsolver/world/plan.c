@@ -95,6 +95,8 @@ carom_plan crm_plan(const carom_world *w)
     p.damping = crm_world_is_damped(w);
     p.solver = p.contacts || w->n_joint_rows > 0 || p.limits;
     p.located = (p.contacts || p.limits) && w->settings.integrator != CAROM_FIXED;
+    p.changes = (p.contacts || p.limits) && w->settings.integrator == CAROM_LOCATED &&
+                (w->settings.order > 2 || w->settings.events == CAROM_EVENTS_ALL);
     p.extrapolated =
         (p.solver || p.damping) && w->settings.order > 2 && w->settings.integrator == CAROM_LOCATED;
     p.threads = w->settings.threads > 1;

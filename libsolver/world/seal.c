@@ -98,7 +98,7 @@ static void lay_world(carom_world *w, crm_block *b)
     w->step_force = crm_carve(b, n3, sizeof(double));
     w->q_saved = crm_carve(b, n3, sizeof(double));
     w->v_saved = crm_carve(b, n3, sizeof(double));
-    w->probe = crm_carve(b, w->settings.order > 2 ? n3 : 0, sizeof(double));
+    w->probe = crm_carve(b, w->plan.changes ? n3 : 0, sizeof(double));
     w->carry = crm_carve(b, (size_t)w->n_bodies, sizeof(double));
     w->carry_saved = crm_carve(b, (size_t)w->n_bodies, sizeof(double));
     for (int k = 0; k < 2; k++) {

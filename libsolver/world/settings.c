@@ -25,6 +25,8 @@ static const word WORDS[] = {
     {"integrator", "located", CAROM_LOCATED},
     {"integrator", "euler", CAROM_EULER},
     {"integrator", "fixed", CAROM_FIXED},
+    {"events", "stops", CAROM_EVENTS_STOPS},
+    {"events", "all", CAROM_EVENTS_ALL},
     {"combine_friction", "mean", CAROM_COMBINE_MEAN},
     {"combine_friction", "geometric", CAROM_COMBINE_GEOMETRIC},
     {"combine_friction", "min", CAROM_COMBINE_MIN},

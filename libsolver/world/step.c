@@ -249,11 +249,11 @@ void crm_put_statics(carom_world *w)
     memcpy(w->sub.q1, w->q, bytes);
     for (int k = 0; k < w->n_solves; k++) memcpy(w->sub.solve[k].q, w->q, bytes);
     for (int i = 0; i < CRM_MAX_INNER && w->inner[i].q0; i++) {
-        memcpy(w->probe, w->q, bytes);
         memcpy(w->inner[i].q0, w->q, bytes);
         memcpy(w->inner[i].q1, w->q, bytes);
         for (int k = 0; k < w->n_solves; k++) memcpy(w->inner[i].solve[k].q, w->q, bytes);
     }
+    if (w->plan.changes) memcpy(w->probe, w->q, bytes);
     w->statics_placed = 1;
 }
 

@@ -53,7 +53,7 @@ static carom_status create_worker(const carom_world *w, carom_world *x)
     carom_status e = crm_solver_create(x);
     if (!e) e = crm_rows_create(x);
     if (!e) e = crm_substeps_create(x);
-    if (e || w->settings.order == 2) return e;
+    if (e || !w->plan.changes) return e;
     x->probe = crm_new(&x->memory, 3 * (size_t)w->n_bodies, sizeof *x->probe);
     return x->probe ? CAROM_OK : CAROM_E_MEMORY;
 }

@@ -27,8 +27,9 @@ static carom_status check_settings(const carom_world_settings *s)
     const int order = s->order >= 2 && s->order <= 2 * CRM_MAX_COLUMNS && s->order % 2 == 0;
     const int finite = isfinite(s->gravity[0]) && isfinite(s->gravity[1]);
     const int words = s->integrator >= CAROM_EULER && s->integrator <= CAROM_FIXED &&
-                      s->combine_friction >= 0 && s->combine_friction <= CAROM_COMBINE_MAX &&
-                      s->combine_restitution >= 0 && s->combine_restitution <= CAROM_COMBINE_MAX;
+                      s->events >= 0 && s->events <= CAROM_EVENTS_ALL && s->combine_friction >= 0 &&
+                      s->combine_friction <= CAROM_COMBINE_MAX && s->combine_restitution >= 0 &&
+                      s->combine_restitution <= CAROM_COMBINE_MAX;
     return positive && bounded && finite && words && s->max_substeps >= 1 && order &&
                    s->max_stiff >= 1 && s->threads >= 1 && s->threads <= CRM_MAX_THREADS
                ? CAROM_OK

@@ -7,6 +7,7 @@
 
 carom_integrator scene_integrator = CAROM_EULER;
 int scene_order = 2;
+int scene_events = 0;
 double scene_tolerance = 0;
 
 static void must(carom_world *w, carom_status e)
@@ -23,6 +24,7 @@ carom_world *scene_world(double g, double dt)
     s.integrator = (int)scene_integrator;
     s.order = scene_order;
     s.tolerance = scene_tolerance;
+    s.events = scene_events;
     assert_int_equal(carom_world_create(&s, NULL, &w), CAROM_OK);
     return w;
 }
@@ -130,6 +132,31 @@ int scene_roll_off(carom_world *w)
     d.friction = 0.9;
     assert_int_equal(carom_world_add_body(w, &d, NULL), CAROM_OK);
     return scene_disc(w, 1, 0.3, 1.3 * sin(0.3), 1.3 * cos(0.3), 0.9, 0);
+}
+
+int scene_rocking(carom_world *w)
+{
+    scene_floor(w, 0.9, 0);
+    const carom_pose pose = {0.15, 0, 0.2 * sin(0.15) + 0.5 * cos(0.15)};
+    return scene_box(w, 1, 0.2, 0.5, pose, 0.9, 0);
+}
+
+int scene_landing(carom_world *w)
+{
+    static const double angles[2] = {1.2, 1.5};
+    carom_vec2 pin = {0, 1.3};
+    scene_floor(w, 0.3, 0.5);
+    int last = scene_anchor(w);
+    for (int k = 0; k < 2; k++) {
+        const double a = angles[k];
+        const carom_pose pose = {a, pin.x + 0.5 * sin(a), pin.y - 0.5 * cos(a)};
+        const int b = scene_box(w, 1, 0.05, 0.5, pose, 0.3, 0.5);
+        assert_int_equal(carom_world_add_revolute(w, last, b, pin, NULL), CAROM_OK);
+        pin.x += sin(a);
+        pin.y -= cos(a);
+        last = b;
+    }
+    return last;
 }
 
 int scene_links(carom_world *w, int n)

@@ -8,6 +8,8 @@
 extern carom_integrator scene_integrator;
 /* ... and their order; 2 at the start. */
 extern int scene_order;
+/* ... whether all events are sought at order 2; 0 at the start. */
+extern int scene_events;
 /* ... and their tolerance; 0 at the start. */
 extern double scene_tolerance;
 /* Gravity (0, -g), step dt. */
@@ -28,6 +30,10 @@ int scene_links(carom_world *w, int n);
 int scene_ladder(carom_world *w);
 /* A disc rolls off a disc: it sticks, begins to slip, and leaves. */
 int scene_roll_off(carom_world *w);
+/* A tall block rocks from foot to foot. */
+int scene_rocking(carom_world *w);
+/* A double pendulum whose end hits the floor, slides on it and leaves it. */
+int scene_landing(carom_world *w);
 /* Velocity of one body; the rest is kept. */
 void scene_push(carom_world *w, int body, double omega, double vx, double vy);
 /* n steps; every status must be 0 or positive.  *last (may be NULL): statistics of the last. */

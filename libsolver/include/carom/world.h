@@ -24,6 +24,12 @@ typedef enum carom_integrator {
     CAROM_FIXED    /* the same without location: one sub-step per step, for piles and real time */
 } carom_integrator;
 
+/* What `located` seeks within a step besides impacts; orders above 2 always seek all. */
+typedef enum carom_events {
+    CAROM_EVENTS_STOPS, /* slips that stop or reverse */
+    CAROM_EVENTS_ALL    /* contacts that open or begin to slip, too */
+} carom_events;
+
 typedef enum carom_combine {
     CAROM_COMBINE_MEAN, /* (a + b)/2, the paper's choice */
     CAROM_COMBINE_GEOMETRIC,
@@ -38,6 +44,7 @@ typedef enum carom_combine {
     X(integrator, int, CAROM_LOCATED, "", "euler, located or fixed")                               \
     X(order, int, 2, "1", "order of located where nothing begins or ends: 2, 4, 6 or 8")           \
     X(tolerance, double, 0, "m", "of located: error of position allowed in a step; 0: by order")   \
+    X(events, int, CAROM_EVENTS_STOPS, "", "what located seeks besides impacts: stops or all")     \
     X(combine_friction, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")                \
     X(combine_restitution, int, CAROM_COMBINE_MEAN, "", "mean, geometric, min or max")             \
     X(length, double, 0, "m", "length scale L; 0: largest diameter of a dynamic body's shape")     \
@@ -267,6 +274,7 @@ typedef struct carom_plan {
     int damping;      /* of bodies */
     int solver;       /* contact problems are solved: contacts, joint rows or limits */
     int located;      /* times of impacts are sought */
+    int changes;      /* ... and those at which contacts open or begin to slip */
     int extrapolated; /* orders above 2: tables of sub-steps */
     int sensors;      /* shapes that only carom_query_sensors sees */
     int threads;      /* islands are shared among several */
