@@ -61,7 +61,10 @@ typedef struct crm_factor_key {
     double delta;
 } crm_factor_key;
 
-enum { CRM_N_VECTORS = 9, CRM_N_SLACKS = 19 };
+enum { CRM_N_VECTORS = 11, CRM_N_SLACKS = 19 };
+
+/* Numbers per contact of a path's work: so many columns of two, and two more, ladder/path.c. */
+enum { CRM_PATH_COLUMNS = 32, CRM_PATH_WORK = 2 * CRM_PATH_COLUMNS + 4 };
 
 typedef struct crm_island {
     int nb;
@@ -87,6 +90,9 @@ typedef struct crm_island {
     crm_vec rest;
     crm_vec step;
     crm_vec way[2];
+    crm_vec path[2];
+    double *column;              /* CRM_PATH_WORK nc */
+    unsigned char *base_mode;    /* nc: modes that a path has factored */
     double *an;                  /* nc: J_n w + c_n of the point last measured */
     double *ut;                  /* nc */
     double *slack[CRM_N_SLACKS]; /* nc each: the interior point's */
@@ -102,6 +108,7 @@ typedef struct crm_island {
     int brief; /* 1: no more than one interior point */
     int factorizations;
     int iterations;
+    int pivots;
 } crm_island;
 
 /* Row times the bodies' parts of z; z += row' l. */

@@ -93,6 +93,7 @@ static void solve_island(job *j, int island)
     o->status = crm_ladder_climb(&s, guess, &o->stage, &o->unpolished);
     o->factorizations = s.factorizations;
     o->iterations = s.iterations;
+    o->pivots = s.pivots;
     o->blocks = s.factorizations ? 2 * (s.lu.lp[s.lu.n] - s.lu.lp[0]) + s.lu.n : 0;
     o->degenerate = o->status == CAROM_E_INFEASIBLE ? 0 : count_degenerate(&s);
 }
@@ -147,6 +148,7 @@ static void add_outcome(const crm_outcome *o, carom_contact_stats *stats)
 {
     stats->factorizations += o->factorizations;
     stats->iterations += o->iterations;
+    stats->pivots += o->pivots;
     stats->blocks += o->blocks;
     stats->degenerate += o->degenerate;
     stats->residual_unpolished = fmax(stats->residual_unpolished, o->unpolished);

@@ -35,6 +35,8 @@ static void layout(crm_arena *a, crm_system *y, const crm_graph *g, const crm_bl
     y->ut = crm_arena_doubles(a, nc);
     for (int i = 0; i < CRM_N_SLACKS; i++) y->slack[i] = crm_arena_doubles(a, nc);
     y->size = crm_arena_doubles(a, 3 * nn);
+    y->column = crm_arena_doubles(a, CRM_PATH_WORK * nc);
+    y->base_mode = crm_arena_take(a, (size_t)nc, 1);
     y->mode = crm_arena_take(a, (size_t)nc, 1);
     y->best_mode = crm_arena_take(a, (size_t)nc, 1);
     y->l = crm_arena_take(a, 9 * (size_t)nz, sizeof(double));
@@ -215,6 +217,8 @@ static void set_vectors(crm_island *s, const crm_system *y, int block, int conta
     s->way[0] = slice(&y->vec[6], block, contact);
     s->way[1] = slice(&y->vec[7], block, contact);
     s->swept = slice(&y->vec[8], block, contact);
+    s->path[0] = slice(&y->vec[9], block, contact);
+    s->path[1] = slice(&y->vec[10], block, contact);
 }
 
 static crm_block_lu lu_view(const crm_system *y, const crm_block_pattern *s, int first, int n)
@@ -254,6 +258,8 @@ crm_island crm_system_island(const crm_system *y, const crm_graph *g, const crm_
                     .an = y->an + contact,
                     .ut = y->ut + contact,
                     .size = y->size + 3 * node,
+                    .column = y->column + CRM_PATH_WORK * (size_t)contact,
+                    .base_mode = y->base_mode + contact,
                     .mode = y->mode + contact,
                     .best_mode = y->best_mode + contact,
                     .best_residual = HUGE_VAL};

@@ -11,6 +11,7 @@ typedef struct crm_outcome {
     double unpolished;
     int factorizations;
     int iterations;
+    int pivots;
     int blocks;
     int degenerate;
 } crm_outcome;
@@ -37,6 +38,8 @@ typedef struct crm_system {
     double *ut;
     double *slack[CRM_N_SLACKS];
     double *size;
+    double *column;
+    unsigned char *base_mode;
     unsigned char *mode;
     unsigned char *best_mode;
     double *l;

@@ -14,9 +14,9 @@
 /* A step is undone when the error grows by more than this factor: smaller growth is needed to leave
  * the neighborhood of a local minimum of the error. */
 #define GROWTH 2
-/* The active set is tried below this residual, or when few modes fail [1]. */
-#define NEAR 1e-4
-enum { FEW = 4, EVERY = 10, FIRST_SWEEPS = 20, SWEEPS = 50, ROUNDS = 8 };
+/* The crossover is tried from points below this residual [1]. */
+#define NEAR 0.1
+enum { EVERY = 3, PIVOTS = 1000, FIRST_SWEEPS = 20, SWEEPS = 50 };
 
 /* Levenberg's damping, contact by contact.  At the center (w, l)^ with modes from the natural map
  * and compliances d, the step solves
@@ -46,19 +46,6 @@ static double measure(crm_island *s, double *residual)
         e += a * a + f * f;
     }
     return sqrt(e);
-}
-
-/* Impulses of s->x into their cones, with the motion w = J' l that they make. */
-static void project(crm_island *s)
-{
-    for (int k = 0; k < s->nc; k++) {
-        s->x.n[k] = fmax(0, s->x.n[k]);
-        const double bound = s->contact[k].mu * s->x.n[k];
-        s->x.t[k] = fmin(bound, fmax(-bound, s->x.t[k]));
-    }
-    memset(s->x.z, 0, 3 * (size_t)s->nb * sizeof(double));
-    crm_island_defect(s, s->x, s->rest.z);
-    memcpy(s->x.z, s->rest.z, 3 * (size_t)s->nb * sizeof(double));
 }
 
 static void set_rhs(const damped *p)
@@ -106,16 +93,10 @@ static void change(damped *p, int k, double factor)
     p->d[k] = fmin(MOST, fmax(LEAST, factor * p->d[k]));
 }
 
-/* New compliances after a step; returns how many modes failed. */
-static int adapt(damped *p)
+/* New compliances after a step. */
+static void adapt(damped *p)
 {
-    int failed = 0;
-    for (int k = 0; k < p->s->nc; k++) {
-        const int holds = mode_holds(p, k);
-        failed += !holds;
-        change(p, k, holds ? DOWN : UP);
-    }
-    return failed;
+    for (int k = 0; k < p->s->nc; k++) change(p, k, mode_holds(p, k) ? DOWN : UP);
 }
 
 static void keep(damped *p, double error, double residual)
@@ -146,7 +127,7 @@ static void begin(damped *p, crm_island *s)
         crm_vec_copy(s, s->x, s->best);
     else
         crm_vec_zero(s, s->x);
-    project(s);
+    crm_into_cones(s);
     crm_sweeps(s, FIRST_SWEEPS);
     for (int k = 0; k < s->nc; k++) p->d[k] = START;
     p->error = measure(s, &p->residual);
@@ -162,8 +143,8 @@ int crm_damped(crm_island *s, int steps)
         crm_vec_copy(s, s->x, p.center);
         crm_modes_at(s);
         step(&p);
-        const int failed = adapt(&p);
-        project(s);
+        adapt(&p);
+        crm_into_cones(s);
         crm_sweeps(s, SWEEPS);
         const double error = measure(s, &residual);
         if (!(residual < p.residual || error < GROWTH * p.error)) {
@@ -172,8 +153,7 @@ int crm_damped(crm_island *s, int steps)
         }
         keep(&p, error, residual);
         if (crm_island_offer(s, s->x, residual)) return 1;
-        const int near = residual < NEAR || failed < FEW;
-        if ((near || i % EVERY == 0) && crm_active_set(s, ROUNDS)) return 1;
+        if (i % EVERY == 0 && residual < NEAR && crm_crossover(s, PIVOTS, (unsigned)i)) return 1;
     }
     return 0;
 }

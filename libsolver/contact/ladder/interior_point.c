@@ -7,12 +7,18 @@
 #define JOINT_COMPLIANCE 1e-12
 /* The residual at which the active-set polish takes over [1]. */
 #define HAND_OVER 1e-8
+/* The crossover is tried when the residual is below this, and again each time that it has fallen by
+ * CROSS_AGAIN [1]. */
+#define CROSS       1e-3
+#define CROSS_AGAIN 1e-2
 /* Smallest centering [1]. */
 #define SIGMA_MIN 1e-8
 /* Products stay above this share of their mean [1]. */
 #define NEIGHBORHOOD 1e-4
 /* Iterations without progress before giving up. */
 #define PATIENCE 8
+/* Contacts from which on an island crosses over, and pivots of one attempt. */
+enum { MANY = 16, PIVOTS = 300 };
 
 /* A direction: the vector of the full system and its slacks. */
 typedef struct direction {
@@ -396,20 +402,34 @@ static int stalls(progress *h, double best, double mean, double defect)
            (h->defect[at] > 0.5 * h->defect[old] || h->defect[at] < 1e-9);
 }
 
-static void iterate(interior *p)
+/* From the iterate, which is the best, by pivots; the iterate stays when they fail. */
+static int cross(interior *p)
+{
+    crm_island *s = p->s;
+    if (crm_crossover(s, PIVOTS, (unsigned)s->iterations)) return 1;
+    crm_vec_copy(s, s->x, s->top);
+    crm_island_residual(s, s->x);
+    return 0;
+}
+
+/* Returns 1 when a crossover was accepted on the way. */
+static int iterate(interior *p)
 {
     crm_island *s = p->s;
     progress history = {.n = 0};
     double best = HUGE_VAL;
+    double near = s->nc < MANY ? 0 : CROSS;
     int short_steps = 0;
     crm_vec_copy(s, s->top, s->x);
     for (int i = 0; i < s->max_iterations; i++) {
         const double r = crm_island_residual(s, s->x);
-        const double defect = find_defects(p);
         if (r < best) {
             best = r;
             crm_vec_copy(s, s->top, s->x);
+            if (r < near && cross(p)) return 1;
+            if (r < near) near = CROSS_AGAIN * r;
         }
+        const double defect = find_defects(p);
         if (stalls(&history, best, p->mean, defect) || r < HAND_OVER || !(r < HUGE_VAL)) break;
         s->iterations++;
         factor(p);
@@ -423,6 +443,7 @@ static void iterate(interior *p)
             short_steps--;
         move(p, &p->way[now], step);
     }
+    return 0;
 }
 
 int crm_interior_point(crm_island *s, crm_interior_start start)
@@ -434,7 +455,7 @@ int crm_interior_point(crm_island *s, crm_interior_start start)
     else
         begin(&p, &start);
     if (!p.n_products) return 0; /* joints alone have no inequality */
-    iterate(&p);
+    if (iterate(&p)) return 1;
     crm_vec_copy(s, s->x, s->top);
     crm_modes_at(s);
     return crm_island_offer(s, s->x, crm_island_residual(s, s->x));

@@ -133,6 +133,35 @@ static int guess_is_exact(crm_island *s)
     return crm_island_offer(s, s->x, r);
 }
 
+/* Guessed impulses that are accepted as they are, when their modes led nowhere: where rows depend
+ * on each other, as between bodies that jam, rounding of the data moves the impulses of a set of
+ * modes by rounding / compliance.  Modes are the guess's where they fit as well. */
+static int guess_is_accepted(crm_island *s)
+{
+    const double tiny = s->accept;
+    const double r = crm_island_residual(s, s->x);
+    if (!(r <= s->accept)) return 0;
+    for (int k = 0; k < s->nc; k++) {
+        if (mode_fits(s, k, s->mode[k], tiny, tiny)) continue;
+        s->mode[k] = (unsigned char)crm_contact_mode_of(&s->contact[k], s->x.n[k], s->x.t[k],
+                                                        s->an[k], s->ut[k]);
+    }
+    return crm_island_offer(s, s->x, r);
+}
+
+/* The rounds from the guess; then the guess itself. */
+static int try_guess_modes(climb *c, int use_guess)
+{
+    crm_island *s = c->s;
+    crm_vec_copy(s, s->swept, s->x);
+    memcpy(s->base_mode, s->mode, (size_t)s->nc);
+    if (try_modes(c, CAROM_STAGE_GUESS, ROUNDS_GUESS)) return 1;
+    if (use_guess != CAROM_GUESS_IMPULSES) return 0;
+    crm_vec_copy(s, s->x, s->swept);
+    memcpy(s->mode, s->base_mode, (size_t)s->nc);
+    return guess_is_accepted(s);
+}
+
 /* The polish also follows an accepted point: it makes complementarity exact. */
 static int try_interior(climb *c, carom_contact_stage stage, crm_interior_start start)
 {
@@ -155,7 +184,7 @@ static int try_guess(climb *c, int use_guess)
     fit_guess(s);
     *c->stage = CAROM_STAGE_GUESS;
     if (use_guess == CAROM_GUESS_IMPULSES && guess_is_exact(s)) return 1;
-    if (try_modes(c, CAROM_STAGE_GUESS, ROUNDS_GUESS)) return 1;
+    if (try_guess_modes(c, use_guess)) return 1;
     if (s->nc < MANY || !(s->best_residual < HUGE_VAL)) return 0;
     crm_vec_copy(s, s->x, s->best);
     return try_interior(c, CAROM_STAGE_INTERIOR_POINT, near) || try_damped(c);

@@ -41,6 +41,13 @@ int crm_interior_point(crm_island *s, crm_interior_start start);
  * its point and the natural modes. */
 void crm_sweeps(crm_island *s, int n_sweeps);
 
+/* Impulses of s->x into their cones, with the motion w = J' l that they make. */
+void crm_into_cones(crm_island *s);
+
+/* From s->x, made the exact solution of a problem with other c, to the solution of this one by
+ * pivots; for points near a solution. */
+int crm_crossover(crm_island *s, int max_pivots, unsigned long long seed);
+
 /* Newton steps with damping of its own for each contact, between sweeps, from s->best. */
 int crm_damped(crm_island *s, int steps);
 

@@ -114,6 +114,18 @@ static double sweep_group(crm_island *s, int q)
     return change;
 }
 
+void crm_into_cones(crm_island *s)
+{
+    for (int k = 0; k < s->nc; k++) {
+        s->x.n[k] = fmax(0, s->x.n[k]);
+        const double bound = s->contact[k].mu * s->x.n[k];
+        s->x.t[k] = fmin(bound, fmax(-bound, s->x.t[k]));
+    }
+    memset(s->x.z, 0, 3 * (size_t)s->nb * sizeof(double));
+    crm_island_defect(s, s->x, s->rest.z);
+    memcpy(s->x.z, s->rest.z, 3 * (size_t)s->nb * sizeof(double));
+}
+
 void crm_sweeps(crm_island *s, int n_sweeps)
 {
     for (int i = 0; i < n_sweeps; i++) {

@@ -83,6 +83,7 @@ typedef struct carom_contact_stats {
     double residual_unpolished; /* before the active-set polish [1] */
     int factorizations;
     int iterations; /* interior point */
+    int pivots;     /* changes of one mode along a path, with few factorizations between them */
     int degenerate; /* contacts weakly active or on the slip border within 1e-9 */
     /* What there was to solve; the rest was left out. */
     int islands;    /* groups of bodies that contacts and joints connect, solved apart */
