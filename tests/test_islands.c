@@ -167,6 +167,66 @@ static void an_impact_is_its_islands(void **state)
     carom_world_destroy(w);
 }
 
+/* Links that swing, 30 m away from stacks of 1 to n boxes. */
+static carom_world *links_beside_stacks(int n)
+{
+    carom_world *w = scene_world(9.81, 1.0 / 60);
+    scene_links(w, 2);
+    const carom_vec2 corners[4] = {{-200, -11}, {0, -11}, {0, -10}, {-200, -10}};
+    const carom_shape shape = {0, 4, corners};
+    carom_body_def floor = carom_body_at(CAROM_STATIC, 0, 0);
+    floor.shapes = &shape;
+    floor.n_shapes = 1;
+    assert_int_equal(carom_world_add_body(w, &floor, NULL), CAROM_OK);
+    for (int k = 0; k < n; k++) {
+        for (int i = 0; i <= k; i++) {
+            scene_box(w, 1, 0.5, 0.25, (carom_pose){0, -30 - 3 * k, -9.75 + 0.5 * i}, 0.5, 0);
+        }
+    }
+    return w;
+}
+
+/* Stacks at rest keep their factors while other islands come between: of all factorizations none is
+ * theirs, and nothing is allocated. */
+static void factors_are_kept_by_island(void **state)
+{
+    (void)state;
+    carom_world *alone = links_beside_stacks(0);
+    carom_world *all = links_beside_stacks(6);
+    scene_run(alone, 5, NULL);
+    scene_run(all, 5, NULL);
+    for (int k = 0; k < 150; k++) {
+        carom_step_stats a;
+        carom_step_stats b;
+        scene_run(alone, 1, &a);
+        scene_run(all, 1, &b);
+        assert_int_equal(b.n_islands, 7);
+        assert_true(a.factorizations > 0);
+        assert_int_equal(a.factorizations, b.factorizations);
+        assert_int_equal(b.allocations, 0);
+    }
+    carom_world_destroy(alone);
+    carom_world_destroy(all);
+}
+
+/* Solvers of islands that are no more are given up. */
+static void solvers_of_the_past_are_given_up(void **state)
+{
+    (void)state;
+    carom_world *w = scene_world(0, 1.0 / 60);
+    for (int k = 0; k < 20; k++) {
+        scene_push(w, scene_disc(w, 1, 0.25, 100 * k, 0, 0.5, 1), 0, 1, 0);
+        scene_push(w, scene_disc(w, 1, 0.25, 100 * k + 1, 0, 0.5, 1), 0, -1, 0);
+    }
+    carom_step_stats s;
+    scene_run(w, 20, &s);
+    const size_t busy = carom_world_measure(w).bytes;
+    scene_run(w, 160, &s); /* each pair has met and parted */
+    assert_int_equal(s.n_candidates, 0);
+    assert_true(carom_world_measure(w).bytes < busy);
+    carom_world_destroy(w);
+}
+
 static int euler(void **state)
 {
     (void)state;
@@ -200,6 +260,9 @@ int main(void)
         cmocka_unit_test_setup(thrown_out_of_its_room, located),
         cmocka_unit_test_setup(free_flight_solves_nothing, located),
         cmocka_unit_test_setup(an_impact_is_its_islands, located),
+        cmocka_unit_test_setup(factors_are_kept_by_island, located),
+        cmocka_unit_test_setup(factors_are_kept_by_island, fixed),
+        cmocka_unit_test_setup(solvers_of_the_past_are_given_up, located),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -84,7 +84,7 @@ static carom_status forces(carom_world *w, const double *q, const double *v)
     const carom_contact_problem p = crm_problem(w, s, c);
     carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
     w->stats->factorizations++;
-    return carom_contact_modes(w->solver, &p, &x);
+    return carom_contact_modes(crm_solver(w), &p, &x);
 }
 
 /* Of the forces in scratch: what is left until the change. */

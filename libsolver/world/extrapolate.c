@@ -180,7 +180,7 @@ static carom_status solve_hold(carom_world *w, crm_substep *s, crm_solve *c)
 {
     const carom_contact_problem p = crm_hold_problem(w, s, c);
     carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
-    const carom_status e = carom_contact_modes(w->solver, &p, &x);
+    const carom_status e = carom_contact_modes(crm_solver(w), &p, &x);
     w->stats->factorizations++;
     for (int i = 0; e >= 0 && i < w->island->n_bodies; i++) {
         memcpy(&c->v[3 * w->island->bodies[i]], &w->rows.v[3 * i], 3 * sizeof *c->v);

@@ -241,8 +241,19 @@ carom_status crm_advance_shared(carom_world *w, int n, crm_advance *advance);
 void crm_stats_add(carom_step_stats *sum, const carom_step_stats *part);
 void crm_threads_free(carom_world *w);
 
-/* world.c: the contact solver of the world's settings. */
-carom_status crm_solver_create(carom_world *w);
+/* world.c: a contact solver of the world's settings. */
+carom_status crm_solver_create(const carom_world *w, carom_contact_solver **out);
+
+/* solvers.c: gives each island of the frame a solver of its own, when there are several. */
+carom_status crm_solvers_assign(carom_world *w);
+void crm_solvers_free(carom_world *w);
+/* Bytes of all solvers and allocations made for them, those given up left out. */
+void crm_solvers_memory(const carom_world *w, size_t *bytes, long *calls);
+/* Of the island under way. */
+static inline carom_contact_solver *crm_solver(const carom_world *w)
+{
+    return w->island->solver ? w->island->solver : w->solver;
+}
 
 /* energy.c */
 /* v' M v of a body; a locked rotation has no part in it. */

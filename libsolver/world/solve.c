@@ -63,7 +63,7 @@ static carom_status run_once(carom_world *w, crm_substep *s, crm_solve *c, int u
                                                   : CAROM_GUESS_IMPULSES;
     const int pressed = s->slick && c->kind != CRM_CORRECTION;
     const int brief = w->effort >= CRM_BRIEF && !pressed ? CAROM_GUESS_BRIEF : 0;
-    const carom_status e = carom_contact_solve(w->solver, &p, guess | brief, &x, &stats);
+    const carom_status e = carom_contact_solve(crm_solver(w), &p, guess | brief, &x, &stats);
     w->effort += stats.factorizations;
     w->stats->factorizations += stats.factorizations;
     if (e < 0) return e;
@@ -126,7 +126,7 @@ static int give_way(carom_world *w, const crm_substep *s, crm_solve *c)
 {
     const crm_rows *r = &w->rows;
     const carom_contact_problem p = crm_problem(w, s, c);
-    if (carom_contact_certificate(w->solver, r->yn, r->ye)) return 0;
+    if (carom_contact_certificate(crm_solver(w), r->yn, r->ye)) return 0;
     double square = 0;
     double value = 0;
     double pressed = 0;

@@ -282,7 +282,8 @@ static carom_status advance(carom_world *w)
     const carom_step_stats fresh = *w->stats;
     carom_status e = crm_islands_find(w, w->settings.dt);
     for (int k = 0; !e; k++) {
-        e = advance_islands(w);
+        e = crm_solvers_assign(w);
+        if (!e) e = advance_islands(w);
         if (e < 0 || !w->islands.escaped) break;
         if (k == MAX_WIDENINGS) {
             if (w->stats->status < CAROM_LIMIT) w->stats->status = CAROM_LIMIT;

@@ -50,7 +50,7 @@ static carom_status create_worker(const carom_world *w, carom_world *x)
     x->n_joint_rows = w->n_joint_rows;
     x->plan = w->plan;
     x->n_solves = w->n_solves;
-    carom_status e = crm_solver_create(x);
+    carom_status e = crm_solver_create(x, &x->solver);
     if (!e) e = crm_rows_create(x);
     if (!e) e = crm_substeps_create(x);
     if (e || !w->plan.changes) return e;

@@ -242,9 +242,21 @@ typedef struct crm_island {
     int n_limited; /* joints with limits */
     int n_driven;  /* joints with a spring or motor */
     int n_pairs;
-    carom_pair *pairs; /* shapes; also with static bodies */
-    int clock;         /* the body whose owed time the frame takes over */
+    carom_pair *pairs;            /* shapes; also with static bodies */
+    int clock;                    /* the body whose owed time the frame takes over */
+    carom_contact_solver *solver; /* its own; NULL: the world's */
 } crm_island;
+
+/* Contact solvers of islands by first body, when there is more than one island; NULL: none. */
+typedef struct crm_kept_solver {
+    carom_contact_solver *solver;
+    long used; /* the last step that did */
+} crm_kept_solver;
+
+typedef struct crm_kept_solvers {
+    int n;
+    crm_kept_solver *list; /* per body; made when first needed */
+} crm_kept_solvers;
 
 typedef struct crm_islands {
     int n;
@@ -318,7 +330,8 @@ struct carom_world {
     int n_joined;
     long *joined; /* sorted keys of body pairs joined so that they do not collide */
     carom_broadphase *broadphase;
-    carom_contact_solver *solver;
+    carom_contact_solver *solver; /* of what no island has its own for */
+    crm_kept_solvers kept;
     crm_rows rows;
     crm_substep sub;
     crm_substep inner[CRM_MAX_INNER]; /* of an extrapolated map; made when order > 2 */

@@ -36,13 +36,13 @@ static carom_status check_settings(const carom_world_settings *s)
                : CAROM_E_ARGUMENT;
 }
 
-carom_status crm_solver_create(carom_world *w)
+carom_status crm_solver_create(const carom_world *w, carom_contact_solver **out)
 {
     carom_contact_settings c = carom_contact_defaults();
     c.accept = w->settings.accept;
     c.inexact = w->settings.inexact;
     c.max_restarts = WORLD_RESTARTS;
-    return carom_contact_create(&c, &w->memory.from, &w->solver);
+    return carom_contact_create(&c, &w->memory.from, out);
 }
 
 carom_status carom_world_create(const carom_world_settings *settings,
@@ -59,7 +59,7 @@ carom_status carom_world_create(const carom_world_settings *settings,
     if (!w) return CAROM_E_MEMORY;
     w->memory = memory;
     w->settings = chosen;
-    carom_status e = crm_solver_create(w);
+    carom_status e = crm_solver_create(w, &w->solver);
     if (!e) e = carom_broadphase_create(allocator, &w->broadphase);
     if (!e) e = crm_reserve_bodies(w);
     if (e) {
@@ -89,6 +89,7 @@ void crm_free_sealed(carom_world *w)
     w->seal_block = NULL;
     crm_rows_free(w);
     crm_anderson_free(&w->memory, &w->anderson);
+    crm_solvers_free(w);
     crm_islands_free(w);
     crm_substep_free(w, &w->sub);
     for (int k = 0; k < CRM_MAX_INNER; k++) crm_substep_free(w, &w->inner[k]);
@@ -227,7 +228,7 @@ long crm_allocations(const carom_world *w)
     size_t bytes;
     long solver;
     long broadphase;
-    carom_contact_memory(w->solver, &bytes, &solver);
+    crm_solvers_memory(w, &bytes, &solver);
     carom_broadphase_memory(w->broadphase, &bytes, &broadphase);
     long sum = w->memory.n_calls + solver + broadphase;
     for (int k = 0; k < w->n_workers; k++) {
@@ -261,7 +262,7 @@ carom_world_size carom_world_measure(const carom_world *world)
                                     w->friction[c->body_b]) > 0;
     }
     z.factor_nonzeros = 9 * w->factor_blocks;
-    carom_contact_memory(w->solver, &solver_bytes, &calls);
+    crm_solvers_memory(w, &solver_bytes, &calls);
     carom_broadphase_memory(w->broadphase, &pair_bytes, &calls);
     z.bytes = w->memory.live + solver_bytes + pair_bytes;
     z.bytes_high = w->memory.high + solver_bytes + pair_bytes;
