@@ -1,12 +1,13 @@
 /* Error against run time: carom's integrators, orders and tolerances beside Box2D 2.4 and Chipmunk
  * 7 where these are installed, same scenes, same run, one thread.
  *
- * Usage: bench_precision [--quick] [scene]: a number from 0; prints CSV: scene, contender, steps
- * per second, tolerance [m], error [m], processor seconds per simulated second (median, least and
- * most of the rounds; the first step is not counted), worst status.  The error is that of one
- * body's pose at the end, an angle times its size.  References are closed forms, or order 8 at 480
- * steps per second, if 960 agree to 1e-10; their agreement is printed as a comment.  --quick: fewer
- * rates and rounds. */
+ * Usage: bench_precision [--quick] [scene], or bench_precision scene K, which prints scene K as
+ * JSON for peers.py.  A scene is a number from 0; prints CSV: scene, contender, steps per second,
+ * tolerance [m], error [m], processor seconds per simulated second (median, least and most of the
+ * rounds; the first step is not counted), worst status.  The error is that of one body's pose at
+ * the end, an angle times its size.  References are closed forms, or order 8 at 480 steps per
+ * second, if 960 agree to 1e-10; their agreement is printed as a comment.  --quick: fewer rates and
+ * rounds. */
 #include "bench/contact/clock.h"
 #include "bench/step/own.h"
 #include "problems.h"
@@ -108,8 +109,10 @@ static void find_reference(problem *p)
     run(p, &c, (int)(480 * p->duration), p->exact, &count);
     run(p, &c, (int)(960 * p->duration), q, &count);
     const double apart = error_of(p, q);
-    printf("# %s: reference agrees to %.1e\n", p->name, apart);
-    if (apart > AGREE) exit(1);
+    if (apart > AGREE) {
+        fprintf(stderr, "%s: its references agree to %.1e only\n", p->name, apart);
+        exit(1);
+    }
 }
 
 static int compare(const void *a, const void *b)
@@ -156,10 +159,47 @@ static void curve(const problem *p, const contender *c, const effort *f)
     }
 }
 
+static const char *shape_name(body_shape shape)
+{
+    return shape == SHAPE_DISC ? "disc" : shape == SHAPE_BOX ? "box" : "none";
+}
+
+static void print_scene(const problem *p)
+{
+    printf("{\"name\": \"%s\", \"gravity\": %.17g, \"duration\": %.17g, \"body\": %d, \"reach\": "
+           "%.17g,\n"
+           " \"exact\": [%.17g, %.17g, %.17g], \"bodies\": [",
+           p->name, p->s.gravity, p->duration, p->body, p->reach, p->exact[0], p->exact[1],
+           p->exact[2]);
+    for (int k = 0; k < p->s.n_bodies; k++) {
+        const scene_body *b = &p->s.bodies[k];
+        printf("%s\n  {\"moves\": %d, \"shape\": \"%s\", \"hx\": %.17g, \"hy\": %.17g, \"mass\": "
+               "%.17g, "
+               "\"inertia\": %.17g, \"friction\": %.17g, \"restitution\": %.17g, "
+               "\"q\": [%.17g, %.17g, %.17g], \"v\": [%.17g, %.17g, %.17g]}",
+               k ? "," : "", b->moves, shape_name(b->shape), b->hx, b->hy, b->mass, b->inertia,
+               b->friction, b->restitution, b->q[0], b->q[1], b->q[2], b->v[0], b->v[1], b->v[2]);
+    }
+    printf("],\n \"pins\": [");
+    for (int k = 0; k < p->s.n_pins; k++) {
+        const scene_pin *x = &p->s.pins[k];
+        printf("%s\n  {\"a\": %d, \"b\": %d, \"x\": %.17g, \"y\": %.17g}", k ? "," : "", x->a, x->b,
+               x->x, x->y);
+    }
+    printf("]}\n");
+}
+
 int main(int argc, char **argv)
 {
     contender list[MAX_CONTENDERS];
     const int n = contenders(list);
+    if (argc == 3 && strcmp(argv[1], "scene") == 0) {
+        problem p = make_problem(atoi(argv[2]));
+        find_reference(&p);
+        print_scene(&p);
+        free(p.s.bodies);
+        return 0;
+    }
     const int quick = argc > 1 && strcmp(argv[1], "--quick") == 0;
     const int one = argc > 1 + quick;
     const int first = one ? atoi(argv[1 + quick]) : 0;

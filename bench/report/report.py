@@ -1,6 +1,6 @@
 """Runs the benchmarks of carom piece by piece and writes their pages: `./dev report`.
 
-usage: report.py --bin FOLDER --work FOLDER --out FOLDER [--quick] [--again] [PART...]
+usage: report.py --bin FOLDER --work FOLDER --out FOLDER [--peers PYTHON] [--quick] [--again] [PART...]
 
 A part is made of pieces; what a piece prints is kept in the work folder, so that an interrupted run
 goes on where it was, and a part that is done is not repeated unless --again says so."""
@@ -23,8 +23,9 @@ N_PRECISION = 17
 GROWTH = ("free", "chain", "stack", "pyramid", "pile", "islands", "hub")
 
 
+# A piece is one command; `scene` pipes a scene of the program into a script of the peers' Python.
 def precision_pieces():
-    return [[str(k)] for k in range(N_PRECISION)]
+    return [piece for k in range(N_PRECISION) for piece in ([str(k)], ["scene", str(k)])]
 
 
 def growth_pieces():
@@ -53,13 +54,17 @@ def say(text):
     print(text, flush=True)
 
 
-def run_piece(command, path):
-    """The output of a command in path, whole or not at all."""
+def run_piece(command, path, reader=None):
+    """The output of a command, or of a reader of it, in path: whole or not at all."""
     partial = path + ".partial"
     with open(partial, "w", encoding="utf-8") as out, open(path + ".log", "w", encoding="utf-8") as log:
-        code = subprocess.run(command, stdout=out, stderr=log, check=False).returncode
+        if reader:
+            scene = subprocess.run(command, stdout=subprocess.PIPE, stderr=log, check=True).stdout
+            code = subprocess.run(reader, input=scene, stdout=out, stderr=log, check=False).returncode
+        else:
+            code = subprocess.run(command, stdout=out, stderr=log, check=False).returncode
     # the atlas counts black cells in its code: its figures are whole all the same
-    if code < 0 or os.path.getsize(partial) == 0:
+    if code < 0 or (os.path.getsize(partial) == 0 and not reader):
         raise Stopped(f"{' '.join(command)} ended with {code}; see {path}.log")
     os.replace(partial, path)
 
@@ -72,7 +77,7 @@ def join(pieces, path):
                 lines = file.readlines()
             header = next((i for i, line in enumerate(lines) if not line.startswith("#")), 0)
             if k:
-                del lines[header]
+                del lines[header:header + 1]
             out.writelines(lines)
 
 
@@ -111,13 +116,17 @@ class Report:
         os.makedirs(folder, exist_ok=True)
         since = time.time()
         files, commands = [], []
+        quick = ["--quick"] if self.options.quick else []
         for k, arguments in enumerate(pieces()):
-            words = (["--quick"] if self.options.quick else []) + arguments
-            commands.append(" ".join([os.path.basename(program), *words]))
+            piped = arguments[:1] == ["scene"]
+            words = arguments if piped else quick + arguments
+            reader = [self.options.peers, os.path.join(ROOT, "bench", part, "peers.py"), *quick]
+            commands.append(" ".join([os.path.basename(program), *words]) +
+                            (f" | peers.py {' '.join(quick)}" if piped else ""))
             files.append(os.path.join(folder, f"{k:02d}.csv"))
             self.progress(part, k, len(pieces()), arguments)
             if not os.path.exists(files[-1]):
-                run_piece([self.program(part), *words], files[-1])
+                run_piece([self.program(part), *words], files[-1], reader if piped else None)
         path = os.path.join(self.options.out, f"{part}.csv")
         join(files, path)
         self.plot(part, path)
@@ -155,8 +164,9 @@ class Report:
             lines.append("| [marks](marks.md) | carom beside every mark of its peers | with precision | | |")
         lines += ["", "## Machine and versions", "", *machine(), "", "## Commands", ""]
         for part in PARTS:
-            for command in self.done.get(part, {}).get("commands", [])[:1]:
-                lines.append(f"* `{command}`" + (" and so on, piece by piece" if len(self.done[part]["commands"]) > 1 else ""))
+            commands = self.done.get(part, {}).get("commands", [])
+            for command in commands[:2]:
+                lines.append(f"* `{command}`" + (" and so on, piece by piece" if len(commands) > 2 else ""))
         with open(os.path.join(self.options.out, "README.md"), "w", encoding="ascii", errors="replace") as file:
             file.write("\n".join(lines) + "\n")
 
@@ -199,6 +209,7 @@ def main():
     parser.add_argument("--bin", required=True)
     parser.add_argument("--work", required=True)
     parser.add_argument("--out", required=True)
+    parser.add_argument("--peers", default=sys.executable, help="a Python that has the peers' packages")
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--again", action="store_true")
     parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS))
