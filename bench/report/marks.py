@@ -43,6 +43,36 @@ def number(x):
     return "-" if x is None else f"{x:.1e}"
 
 
+def steps(out):
+    """Time per step beside the marks, from the page of bench_step; none when that has not run."""
+    path = os.path.join(out, "step.md")
+    if not os.path.exists(path):
+        return []
+    found = {}
+    with open(path, encoding="ascii") as file:
+        for line in file:
+            cells = [c.strip() for c in line.strip().strip("|").split("|")]
+            if len(cells) > 3 and cells[2][:1].isdigit():
+                found.setdefault(cells[0], {})[cells[1]] = float(cells[2])
+    lines = ["", "## Microseconds per step", "",
+             "Marks as they were measured another day; Box2D 2.4 and Chipmunk of this run beside them.", "",
+             "| scene | mark | by | Box2D 2.4 | Chipmunk 7 | carom | by | carom over the best peer now | |",
+             "|---|---|---|---|---|---|---|---|---|"]
+    with open(os.path.join(HERE, "step_marks.csv"), encoding="ascii") as file:
+        for m in csv.DictReader(file):
+            times = found.get(m["scene"])
+            if not times:
+                continue
+            own, name = min((t, n) for n, t in times.items() if n.startswith("carom"))
+            peers = [t for n, t in times.items() if not n.startswith("carom")]
+            best = min(peers, default=float(m["microseconds"]))
+            cells = [m["scene"], m["microseconds"], m["who"], *(f"{times[p]:.3g}" if p in times else "-" for p in
+                     ("Box2D 2.4", "Chipmunk 7")), f"{own:.3g}", name, f"{own / best:.2f}",
+                     "won" if own <= best else "lost"]
+            lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
 def main(path, out):
     plot = precision_plot()
     rows = plot.read(path)
@@ -63,7 +93,7 @@ def main(path, out):
     closing = (f"\n{won} won, {lost} lost. Where the peers of this run do not reach an error, the mark stands for them.\n\n"
                "Errors below these marks, and scenes with none, are in precision.md: carom alone reaches them.\n")
     with open(os.path.join(out, "marks.md"), "w", encoding="ascii") as file:
-        file.write(HEAD + "\n".join(lines) + "\n" + closing)
+        file.write(HEAD + "\n".join(lines) + "\n" + closing + "\n".join(steps(out)) + "\n")
 
 
 if __name__ == "__main__":

@@ -28,6 +28,10 @@ def precision_pieces():
     return [piece for k in range(N_PRECISION) for piece in ([str(k)], ["scene", str(k)])]
 
 
+def step_pieces():
+    return [[str(k)] for k in range(11)]
+
+
 def growth_pieces():
     return [[family] for family in GROWTH]
 
@@ -39,11 +43,16 @@ def whole():
 # name: (program below the folder of benchmarks, its pieces, what it shows)
 PARTS = {
     "precision": ("precision/bench_precision", precision_pieces, "error against run time"),
+    "step": ("step/bench_step", step_pieces, "microseconds per step beside peers, and what rests"),
     "growth": ("growth/bench_growth", growth_pieces, "time, memory and work against the number of bodies"),
     "gradient": ("gradient/bench_gradient", whole, "cost and error of gradients"),
     "stability": ("stability/bench_stability", whole, "the stability atlas"),
     "leave_out": ("leave_out/bench_leave_out", whole, "what scenes do not need, and what that saves"),
 }
+
+
+# Programs that print their page themselves, and know no --quick: their rounds are short.
+PLAIN = ("step",)
 
 
 class Stopped(Exception):
@@ -81,6 +90,17 @@ def join(pieces, path):
             out.writelines(lines)
 
 
+def write_page(title, pieces, path):
+    """The tables of all pieces as one; other lines are what a peer says of itself."""
+    rows = []
+    for piece in pieces:
+        with open(piece, encoding="utf-8", errors="replace") as file:
+            rows += [line for line in file if line.startswith("|") and line not in rows[:2]]
+    with open(path, "w", encoding="ascii", errors="replace") as out:
+        out.write(f"# {title.capitalize()}\n\nOne thread, the least of several rounds' means; what the columns are: ../performance.md.\n\n")
+        out.writelines(rows)
+
+
 class Report:
     def __init__(self, options):
         self.options = options
@@ -116,7 +136,7 @@ class Report:
         os.makedirs(folder, exist_ok=True)
         since = time.time()
         files, commands = [], []
-        quick = ["--quick"] if self.options.quick else []
+        quick = ["--quick"] if self.options.quick and part not in PLAIN else []
         for k, arguments in enumerate(pieces()):
             piped = arguments[:1] == ["scene"]
             words = arguments if piped else quick + arguments
@@ -127,8 +147,11 @@ class Report:
             self.progress(part, k, len(pieces()), arguments)
             if not os.path.exists(files[-1]):
                 run_piece([self.program(part), *words], files[-1], reader if piped else None)
-        path = os.path.join(self.options.out, f"{part}.csv")
-        join(files, path)
+        path = os.path.join(self.options.out, f"{part}.{'md' if part in PLAIN else 'csv'}")
+        if part in PLAIN:
+            write_page(PARTS[part][2], files, path)
+        else:
+            join(files, path)
         self.plot(part, path)
         seconds = time.time() - since
         self.remember(part, {"kind": self.kind, "seconds": seconds, "commands": commands,
@@ -143,10 +166,11 @@ class Report:
     def plot(self, part, path):
         folder = os.path.join(ROOT, "bench", part)
         scripts = [os.path.join(folder, "plot.py")]
-        if part == "precision":
+        if part in ("precision", "step") and os.path.exists(os.path.join(self.options.out, "precision.csv")):
             scripts.append(os.path.join(HERE, "marks.py"))
+            path = os.path.join(self.options.out, "precision.csv")
         for script in scripts:
-            if os.path.exists(script):
+            if os.path.exists(script) and part not in PLAIN or script.endswith("marks.py"):
                 subprocess.run([sys.executable, script, path, self.options.out], check=True)
 
     def page(self):
