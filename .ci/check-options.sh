@@ -47,6 +47,21 @@ build() {
     }
 }
 
+# without NAME PATTERN: no symbol of its binaries, defined or wanted, and no library that they load
+# matches.
+without() {
+    found=$(find "$work/$1" \( -name '*.a' -o -name '*.so*' \) -type f)
+    [ -n "$found" ] || fail "$1 has no library"
+    for library in $found; do
+        traces=$({
+            nm -P "$library" 2>/dev/null | cut -d ' ' -f 1
+            readelf -d "$library" 2>/dev/null | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p'
+        } | grep -E "$2" || true)
+        [ -z "$traces" ] || fail "$library has traces of what was left out:" "$traces"
+    done
+    echo "    no trace of $2"
+}
+
 run_tests() {
     [ -f "$work/$1/CTestTestfile.cmake" ] || return 0
     (cd "$work/$1" && ctest --output-on-failure -LE long -j "$jobs") >"$work/$1-test.log" 2>&1 || {
@@ -101,5 +116,11 @@ if [ "$mode" = quick ]; then
     configure no-klu -DCAROM_WITH_KLU=OFF -DCAROM_BUILD_TESTS=OFF -DCAROM_BUILD_EXAMPLES=OFF \
         -DCAROM_BUILD_DAEMON=OFF -DCAROM_BUILD_CLIENTS=OFF "-DCAROM_WERROR=$werror"
     build no-klu
+    without no-klu '^(klu_|btf_|colamd|carom_lcp_)|lib(klu|btf|lcm)|lcm_|crm_wire|crm_session'
+    configure bare -DCAROM_BUILD_WORLD=OFF -DCAROM_WITH_KLU=OFF -DCAROM_BUILD_TESTS=OFF \
+        -DCAROM_BUILD_EXAMPLES=OFF -DCAROM_BUILD_DAEMON=OFF -DCAROM_BUILD_CLIENTS=OFF \
+        -DBUILD_SHARED_LIBS=ON "-DCAROM_WERROR=$werror"
+    build bare
+    without bare '^(klu_|btf_|colamd|ccd|carom_(lcp|world|collide|tape)_)|lib(klu|btf|ccd|lcm)|lcm_'
 fi
 echo "every option works both ways"
