@@ -316,7 +316,7 @@ static void refuses_what_does_not_fit(void **state)
     refuses(w, 39, s.bytes, "these bytes are none");
     for (size_t n = 40; n < s.size; n++) refuses(w, n, s.bytes, "cut off");
     s.bytes[8]++;
-    refuses(w, s.size, s.bytes, "of format 3");
+    refuses(w, s.size, s.bytes, "of format 4");
     s.bytes[8]--;
     s.bytes[0] = 'C';
     refuses(w, s.size, s.bytes, "these bytes are none");

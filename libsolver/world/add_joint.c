@@ -27,6 +27,8 @@ carom_joint_def carom_joint_defaults(carom_joint_kind kind)
     d.axis.x = 1;
     d.lower = -HUGE_VAL;
     d.upper = HUGE_VAL;
+    d.break_force = HUGE_VAL;
+    d.break_torque = HUGE_VAL;
     d.collide = kind == CAROM_DISTANCE || kind == CAROM_ROPE || kind == CAROM_TARGET ||
                 kind == CAROM_LOCK_X || kind == CAROM_LOCK_Y || kind == CAROM_LOCK_ANGLE;
     return d;
@@ -173,6 +175,15 @@ static carom_status check_limits(carom_world *w, const carom_joint_def *d)
                           id, name, now, d->lower, d->upper);
 }
 
+static carom_status check_strength(carom_world *w, const carom_joint_def *d)
+{
+    if (d->break_force > 0 && d->break_torque > 0) return CAROM_OK;
+    return crm_world_fail(w, CAROM_E_ARGUMENT,
+                          "joint %d: breaks at force %g and torque %g: must be positive; infinite: "
+                          "never",
+                          w->n_joints, d->break_force, d->break_torque);
+}
+
 /* R(angle)' (point - position) */
 static carom_vec2 to_local(carom_pose p, carom_vec2 point)
 {
@@ -204,6 +215,8 @@ static crm_joint make_joint(const carom_world *w, const carom_joint_def *d)
     j.rest = d->rest;
     j.motor_speed = d->motor_speed;
     j.motor_limit = d->motor_limit;
+    j.break_force = d->break_force;
+    j.break_torque = d->break_torque;
     j.collide = d->collide != 0;
     j.first_row = w->n_joint_rows;
     j.n_held = crm_joint_measures(d->kind, &measures);
@@ -219,6 +232,7 @@ carom_status carom_world_add_joint(carom_world *world, const carom_joint_def *de
     if (!e) e = check_places(w, def);
     if (!e) e = check_limits(w, def);
     if (!e) e = check_drive(w, def);
+    if (!e) e = check_strength(w, def);
     if (e) return e;
     void *joints = w->joints;
     e = crm_reserve(&w->memory, &joints, &w->max_joints, w->n_joints + 1, sizeof *w->joints);
@@ -228,6 +242,7 @@ carom_status carom_world_add_joint(carom_world *world, const carom_joint_def *de
     const crm_joint j = make_joint(w, def);
     w->joints[w->n_joints++] = j;
     w->n_joint_rows += j.n_rows;
+    w->n_breakable += crm_joint_breaks(&j);
     return CAROM_OK;
 }
 

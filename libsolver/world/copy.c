@@ -68,6 +68,7 @@ static carom_status copy_joints(carom_world *w, const carom_world *from)
     if (e) return e;
     w->n_joints = from->n_joints;
     w->n_joint_rows = from->n_joint_rows;
+    w->n_breakable = from->n_breakable;
     w->n_excluded = from->n_excluded;
     return CAROM_OK;
 }

@@ -49,7 +49,7 @@ static carom_contact_event *put(carom_world *w, carom_event_kind kind, const crm
     crm_events *s = &w->events;
     const crm_contact *c = &t->contact;
     const carom_contact_event event = {kind, c->body_a, c->body_b, c->shape_a, c->shape_b, time,
-                                       0,    0,         0,         t->point,   c->normal};
+                                       0,    0,         0,         t->point,   c->normal,  -1};
     s->list[s->n++] = event;
     return &s->list[s->n - 1];
 }
@@ -119,7 +119,24 @@ static int order(const crm_touch *a, const crm_touch *b)
 
 carom_status crm_events_reserve(carom_world *w)
 {
-    return reserve(w, w->touches.n + w->next.n);
+    return reserve(w, w->touches.n + w->next.n + w->n_breakable);
+}
+
+void crm_events_break(carom_world *w, int joint)
+{
+    crm_events *s = &w->events;
+    const crm_joint *j = &w->joints[joint];
+    const crm_joint_frame f = crm_joint_frame_at(j, w->q);
+    carom_contact_event event = {0};
+    event.kind = CAROM_JOINT_BREAK;
+    event.body_a = j->body_a;
+    event.body_b = j->body_b;
+    event.shape_a = event.shape_b = -1;
+    event.time = w->settings.dt;
+    event.point.x = w->q[3 * j->body_a + 1] + f.arm_a.x;
+    event.point.y = w->q[3 * j->body_a + 2] + f.arm_a.y;
+    event.joint = joint;
+    s->list[s->n++] = event;
 }
 
 void crm_events_compare(carom_world *w, int n_before)

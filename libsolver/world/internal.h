@@ -378,6 +378,14 @@ carom_status crm_events_reserve(carom_world *w);
 /* What the touches have that the n_before of the last step had not, and the other way round. */
 void crm_events_compare(carom_world *w, int n_before);
 
+/* A joint breaks; there is room for it. */
+void crm_events_break(carom_world *w, int joint);
+
+/* break.c */
+int crm_joint_breaks(const crm_joint *j);
+/* At the end of a step: joints that bore too much are broken. */
+void crm_break_joints(carom_world *w);
+
 /* seal.c */
 carom_status crm_seal(carom_world *w);
 /* The same without a look at overlaps: for a state that a step left. */

@@ -186,7 +186,9 @@ static void fill_islands(carom_world *w)
 {
     crm_islands *s = &w->islands;
     for (int k = 0; k < s->n_pairs; k++) s->list[s->label[pair_body(w, s->found[k])]].n_pairs++;
-    for (int k = 0; k < w->n_joints; k++) s->list[s->label[joint_body(w, k)]].n_joints++;
+    for (int k = 0; k < w->n_joints; k++) {
+        if (!w->joints[k].broken) s->list[s->label[joint_body(w, k)]].n_joints++;
+    }
     int bodies = 0;
     int joints = 0;
     int pairs = 0;
@@ -206,6 +208,7 @@ static void fill_islands(carom_world *w)
         i->bodies[i->n_bodies++] = b;
     }
     for (int k = 0; k < w->n_joints; k++) {
+        if (w->joints[k].broken) continue;
         crm_island *i = &s->list[s->label[joint_body(w, k)]];
         i->joints[i->n_joints++] = k;
         i->n_rows += w->joints[k].n_rows;
@@ -231,7 +234,9 @@ static carom_status group(carom_world *w)
     for (int k = 0; k < s->n_pairs; k++) {
         connect(w, w->shapes[s->found[k].a].body, w->shapes[s->found[k].b].body);
     }
-    for (int k = 0; k < w->n_joints; k++) connect(w, w->joints[k].body_a, w->joints[k].body_b);
+    for (int k = 0; k < w->n_joints; k++) {
+        if (!w->joints[k].broken) connect(w, w->joints[k].body_a, w->joints[k].body_b);
+    }
     label_bodies(w);
     fill_islands(w);
     return CAROM_OK;

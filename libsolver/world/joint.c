@@ -121,6 +121,7 @@ double crm_joint_drift(const carom_world *w, const double *q)
     for (int k = 0; k < w->n_joints; k++) {
         double je[6 * CRM_MAX_JOINT_ROWS];
         double e[CRM_MAX_JOINT_ROWS] = {0, 0, 0};
+        if (w->joints[k].broken) continue;
         crm_joint_rows(&w->joints[k], q, je, e);
         largest = fmax(largest, sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]));
         for (int side = 1; crm_joint_has_limits(&w->joints[k]) && side <= 2; side++) {
@@ -147,6 +148,7 @@ carom_joint_force carom_world_joint_force(const carom_world *world, int joint)
     carom_joint_force total = {{0, 0}, 0};
     if (joint < 0 || joint >= w->n_joints || !w->joint_total) return total;
     const crm_joint *j = &w->joints[joint];
+    if (j->broken) return total;
     for (int k = 0; k < j->n_rows; k++) {
         const crm_measure m = k < j->n_held ? HELD[j->kind].measure[k] : crm_motor_measure(j->kind);
         add_measure(w, j, m, w->joint_total[j->first_row + k], &total);

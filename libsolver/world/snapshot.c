@@ -76,9 +76,10 @@ static void hash_joints(crm_coder *c, const carom_world *w)
         hash_whole(c, j->collide != 0);
         hash_vec(c, j->local_a);
         hash_vec(c, j->local_b);
-        const double numbers[] = {j->axis,        j->angle,       j->length,     j->lower,
-                                  j->upper,       j->stiffness,   j->damping,    j->rest,
-                                  j->restitution, j->motor_speed, j->motor_limit};
+        const double numbers[] = {j->axis,        j->angle,       j->length,      j->lower,
+                                  j->upper,       j->stiffness,   j->damping,     j->rest,
+                                  j->restitution, j->motor_speed, j->motor_limit, j->break_force,
+                                  j->break_torque};
         for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) hash_number(c, numbers[i]);
     }
     hash_whole(c, w->n_excluded);
@@ -197,6 +198,11 @@ static void code_state(crm_coder *c, carom_world *w, int *n_touches)
     for (int b = 0; b < w->n_bodies; b++) code_body(c, w, b);
     for (int i = 0; i < 2; i++) crm_code_places(c, (size_t)w->n_joint_rows, w->joint_force[i]);
     crm_code_places(c, (size_t)w->n_joint_rows, w->joint_total);
+    for (int k = 0; k < w->n_joints; k++) {
+        unsigned char broken = (unsigned char)w->joints[k].broken;
+        crm_code_byte(c, &broken, 1);
+        if (c->how == CRM_READ) w->joints[k].broken = broken;
+    }
     *n_touches = w->touches.n;
     crm_code_int(c, n_touches, 0, INT_MAX);
     for (int k = 0; k < *n_touches && !c->bad; k++) {

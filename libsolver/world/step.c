@@ -341,6 +341,7 @@ static carom_status step(carom_world *w, const double *force)
     const int n_before = w->touches.n;
     crm_touches_turn(w);
     if (w->events.on) crm_events_compare(w, n_before);
+    crm_break_joints(w);
     w->n_steps++;
     finish_stats(w);
     return w->stats->status;

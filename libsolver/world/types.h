@@ -69,6 +69,9 @@ typedef struct crm_joint {
     double rest;        /* where the spring is at rest [m, rad] */
     double motor_speed; /* of what crm_motor_measure says [m/s, rad/s] */
     double motor_limit; /* largest force or torque of the motor [N, N m]; 0: no motor */
+    double break_force; /* [N], [N m]; HUGE_VAL: never */
+    double break_torque;
+    int broken; /* 1: holds nothing, belongs to no island */
     int collide;
     int first_row; /* among the rows of all joints */
     int n_rows;    /* held, then that of the motor */
@@ -308,6 +311,7 @@ struct carom_world {
     int n_vertices, max_vertices;
     carom_vec2 *vertices;
     int n_joints, max_joints;
+    int n_breakable; /* joints */
     int n_joint_rows;
     crm_joint *joints;
     int n_excluded, max_excluded;

@@ -1,9 +1,9 @@
 /* events.h: which contacts began, ended and hit in the last step of a world.
  *
  * Nothing is recorded unless asked for.  Impacts come first, island by island (that of the lowest
- * body first) and in each as time goes; then begins and ends by shape pair.  `fixed` may take one
- * impact in two steps.  A step that fails has no events; after it, and after carom_world_set_state,
- * all contacts begin anew. */
+ * body first) and in each as time goes; then begins and ends by shape pair, then breaks by joint.
+ * `fixed` may take one impact in two steps.  A step that fails has no events; after it, and after
+ * carom_world_set_state, all contacts begin anew. */
 #ifndef CAROM_EVENTS_H
 #define CAROM_EVENTS_H
 
@@ -17,18 +17,20 @@ typedef enum carom_event_kind {
     CAROM_CONTACT_IMPACT, /* a contact point is met faster than v_rest, or passes such an impact on
                            */
     CAROM_CONTACT_BEGIN,  /* two shapes touch at the end of the step, and did not at its start */
-    CAROM_CONTACT_END     /* the other way round; a bounce within a step has neither */
+    CAROM_CONTACT_END,    /* the other way round; a bounce within a step has neither */
+    CAROM_JOINT_BREAK     /* a joint breaks at the end of the step */
 } carom_event_kind;
 
 typedef struct carom_contact_event {
     carom_event_kind kind;
     int body_a, body_b;
-    int shape_a, shape_b; /* in the order of adding, of all bodies together */
-    double time;          /* since the step began [s]; dt for begin and end */
+    int shape_a, shape_b; /* in the order of adding, of all bodies together; of a break -1 */
+    double time;          /* since the step began [s]; dt for begin, end and break */
     double approach;      /* of an impact: speed of closing before it [m/s] */
     double ln, lt;        /* its impulses along normal and tangent [N s]; else 0 */
     carom_vec2 point;     /* on A, world [m]; of an end where it last was */
-    carom_vec2 normal;    /* from A to B */
+    carom_vec2 normal;    /* from A to B; of a break 0 */
+    int joint;            /* that breaks; else -1 */
 } carom_contact_event;
 
 /* From the next step on, or no longer.  Limits of joints make no events. */

@@ -14,7 +14,7 @@ extern "C" {
 #endif
 
 /* Of the layout of the bytes: 1.  Another one is refused. */
-#define CAROM_SNAPSHOT_FORMAT 2
+#define CAROM_SNAPSHOT_FORMAT 3
 
 /* Writes the snapshot to bytes[capacity]; *size is what it needs.  Seals the world when the caller
  * has not.  capacity 0 and bytes NULL: only *size.  CAROM_E_CAPACITY: more is needed; nothing was

@@ -168,10 +168,14 @@ typedef struct carom_joint_def {
     double motor_speed; /* [rad/s], [m/s] */
     double motor_limit; /* largest torque or force [N m, N]; 0: no motor */
     int collide;        /* 1: the two bodies may touch each other */
+    /* A step at whose end carom_world_joint_force is above one of these breaks the joint: it holds
+     * nothing from the next step on.  INFINITY: never. */
+    double break_force;  /* [N], > 0 */
+    double break_torque; /* [N m], > 0 */
 } carom_joint_def;
 
-/* Bodies -1 (to be given), points at the origin, axis (1, 0), no limits, spring or motor; only
- * bodies joined by a distance, rope, target or lock collide. */
+/* Bodies -1 (to be given), points at the origin, axis (1, 0), no limits, spring or motor,
+ * unbreakable; only bodies joined by a distance, rope, target or lock collide. */
 CAROM_API carom_joint_def carom_joint_defaults(carom_joint_kind kind);
 /* "revolute", "prismatic", "weld", "wheel", "distance", "rope", "target", "lock_x", "lock_y",
  * "lock_angle"; NULL for any other number. */
@@ -225,6 +229,8 @@ typedef struct carom_joint_force {
     double torque;    /* about that anchor [N m] */
 } carom_joint_force;
 CAROM_API carom_joint_force carom_world_joint_force(const carom_world *world, int joint);
+/* 1: it has broken. */
+CAROM_API int carom_world_joint_broken(const carom_world *world, int joint);
 /* Steps taken, and their time [s]. */
 CAROM_API long carom_world_steps(const carom_world *world);
 CAROM_API double carom_world_time(const carom_world *world);
