@@ -244,6 +244,16 @@ void crm_threads_free(carom_world *w);
 /* world.c: a contact solver of the world's settings. */
 carom_status crm_solver_create(const carom_world *w, carom_contact_solver **out);
 
+/* sleep.c: what the setting needs. */
+carom_status crm_sleep_create(carom_world *w);
+void crm_sleep_free(carom_world *w);
+/* Everything is run again. */
+void crm_sleep_forget(carom_world *w);
+/* *asleep: the island under way needs no step; its touches are there. */
+carom_status crm_sleep_on(carom_world *w, int *asleep);
+/* After a step of the island under way: puts it to rest where it barely moves. */
+void crm_sleep_settle(carom_world *w);
+
 /* solvers.c: gives each island of the frame a solver of its own, when there are several. */
 carom_status crm_solvers_assign(carom_world *w);
 void crm_solvers_free(carom_world *w);
@@ -284,6 +294,8 @@ carom_status crm_touches_reserve(carom_world *w, int n);
 /* As much room in both lists, for they take turns. */
 carom_status crm_touches_even(carom_world *w);
 void crm_forget_guesses(carom_world *w);
+/* The last step's touches of a pair of shapes. */
+const crm_touch *crm_touches_of(const carom_world *w, carom_pair pair, int *n);
 /* The frame is done: next becomes the touches, ordered. */
 void crm_touches_turn(carom_world *w);
 

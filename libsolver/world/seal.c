@@ -122,6 +122,7 @@ static carom_status allocate(carom_world *w)
     lay_world(w, &b);
     carom_status e = crm_rows_create(w);
     if (!e) e = crm_islands_create(w);
+    if (!e) e = crm_sleep_create(w);
     return e ? e : crm_substeps_create(w);
 }
 

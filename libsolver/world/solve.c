@@ -189,6 +189,22 @@ static int find_pair(int n, const crm_touch *t, const crm_contact *c)
     return low;
 }
 
+const crm_touch *crm_touches_of(const carom_world *w, carom_pair pair, int *n)
+{
+    crm_contact c = {0};
+    c.shape_a = pair.a;
+    c.shape_b = pair.b;
+    const crm_touches *t = &w->touches;
+    const int first = find_pair(t->n, t->list, &c);
+    int end = first;
+    while (end < t->n && t->list[end].contact.shape_a == pair.a &&
+           t->list[end].contact.shape_b == pair.b) {
+        end++;
+    }
+    *n = end - first;
+    return t->n ? t->list + first : NULL;
+}
+
 /* What is known of contact c: its touch, or NULL. */
 static const crm_touch *recall(const carom_world *w, const crm_contact *c)
 {
@@ -332,6 +348,7 @@ void crm_forget_guesses(carom_world *w)
 {
     const size_t bytes = (size_t)w->n_joint_rows * sizeof(double);
     w->touches.n = 0;
+    crm_sleep_forget(w);
     for (int i = 0; i < 2 && w->joint_force[i]; i++) memset(w->joint_force[i], 0, bytes);
     if (w->joint_total) memset(w->joint_total, 0, bytes);
 }

@@ -206,6 +206,7 @@ static carom_status advance_island(carom_world *w, const crm_island *island)
 {
     const double dt = w->settings.dt;
     double left = dt + w->carry[island->clock];
+    int asleep;
     crm_enter(w, island);
     w->n_substeps = 0;
     w->n_impacts = 0;
@@ -213,6 +214,8 @@ static carom_status advance_island(carom_world *w, const crm_island *island)
     w->n_parts = 0;
     w->effort = 0;
     w->first_touch = w->next.n;
+    const carom_status slept = crm_sleep_on(w, &asleep);
+    if (slept || asleep) return slept;
     for (int k = 0; left > CARRY_TOL * dt; k++) {
         const int n = k - w->n_stiff;
         if (n >= 2 * MAX_SUBSTEPS) return CAROM_E_NO_SOLUTION;
@@ -220,6 +223,7 @@ static carom_status advance_island(carom_world *w, const crm_island *island)
         if (e < 0) return e;
     }
     finish_island(w, left);
+    crm_sleep_settle(w);
     return CAROM_OK;
 }
 

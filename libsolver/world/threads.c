@@ -34,6 +34,7 @@ void crm_stats_add(carom_step_stats *sum, const carom_step_stats *part)
     sum->factorizations += part->factorizations;
     sum->iterations += part->iterations;
     sum->degenerate += part->degenerate;
+    sum->n_asleep += part->n_asleep;
 }
 
 #ifdef CRM_THREADS

@@ -294,6 +294,8 @@ typedef struct crm_recorder {
     void *user;
 } crm_recorder;
 
+typedef struct crm_rest crm_rest; /* sleep.c */
+
 struct carom_world {
     crm_memory memory;
     carom_world_settings settings;
@@ -354,6 +356,8 @@ struct carom_world {
     int n_stiff;              /* sub-steps of the island that ended for stiff joints alone */
     int n_parts;              /* into which stiff joints divide its frame; 0: not known yet */
     int effort;               /* factorizations of the island in this frame */
+    crm_rest *rest;      /* per body; NULL: nothing sleeps */
+    double *rest_forces; /* three per joint row: of the joints before the step */
     crm_touches touches, next;
     int first_touch;        /* of the island, in next */
     double *joint_force[2]; /* per joint row: as crm_touch.force_n [N] */

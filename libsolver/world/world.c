@@ -31,7 +31,8 @@ static carom_status check_settings(const carom_world_settings *s)
                       s->combine_friction <= CAROM_COMBINE_MAX && s->combine_restitution >= 0 &&
                       s->combine_restitution <= CAROM_COMBINE_MAX;
     return positive && bounded && finite && words && s->max_substeps >= 1 && order &&
-                   s->max_stiff >= 1 && s->threads >= 1 && s->threads <= CRM_MAX_THREADS
+                   s->max_stiff >= 1 && (s->sleep == 0 || s->sleep == 1) && s->threads >= 1 &&
+                   s->threads <= CRM_MAX_THREADS
                ? CAROM_OK
                : CAROM_E_ARGUMENT;
 }
@@ -90,6 +91,7 @@ void crm_free_sealed(carom_world *w)
     crm_rows_free(w);
     crm_anderson_free(&w->memory, &w->anderson);
     crm_solvers_free(w);
+    crm_sleep_free(w);
     crm_islands_free(w);
     crm_substep_free(w, &w->sub);
     for (int k = 0; k < CRM_MAX_INNER; k++) crm_substep_free(w, &w->inner[k]);

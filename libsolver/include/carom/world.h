@@ -53,6 +53,7 @@ typedef enum carom_combine {
     X(rest_speed, double, 1e-3, "sqrt(g L)", "approach slower than this does not bounce")          \
     X(max_substeps, int, 32, "1", "sub-steps of an island, at most; 128/bodies in large ones")     \
     X(threads, int, 1, "1", "among which islands are shared, 1 to 64: the same bits")              \
+    X(sleep, int, 0, "", "1: what rests is not run until something changes; not on a tape")        \
     X(max_stiff, int, 256, "1", "sub-steps that stiff joints ask for, at most; 1: none")           \
     X(project_overlap, int, 1, "", "overlap of the initial scene: 1 projected away, 0 refused")    \
     X(accept, double, 1e-10, "1", "residual of a solved contact problem")                          \
@@ -204,6 +205,7 @@ typedef struct carom_step_stats {
     double estimate;    /* of the error of position in this step, where there is one [m]; else 0 */
     double energy;      /* kinetic + gravitational at the end [J] */
     int n_islands;      /* groups of bodies that advanced alone */
+    int n_asleep;       /* bodies at rest that were not run; setting sleep */
     int n_candidates;   /* pairs that may touch within the step */
     int n_contacts;     /* contact points of the islands' last sub-steps */
     int n_substeps;     /* of the busiest island */
