@@ -155,7 +155,7 @@ static void snapshots_carry_it(void **state)
  * of the break. */
 static double thrown(double vx, int n, int every, double *by_vx)
 {
-    carom_world *w = bob(vx, 2 * (G + 0.9), INFINITY);
+    carom_world *w = bob(vx, 2 * (G + 0.955), INFINITY);
     carom_tape *tape;
     assert_int_equal(carom_tape_create(w, NULL, &tape), CAROM_OK);
     assert_int_equal(carom_tape_checkpoint(tape, every), CAROM_OK);
