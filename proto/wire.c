@@ -33,7 +33,7 @@ typedef struct field {
     const char *option;
 } field;
 
-enum { N_SLOTS = 16 };
+enum { N_SLOTS = 32 };
 
 #define LIMIT(name) offsetof(crm_wire_limits, name), "--max-" #name
 #define F_FIXED(name, size)                                                                        \
@@ -84,6 +84,10 @@ static const field scene_fields[] = {
     F_ARRAY("inertia", 1, 8),
     F_ARRAY("friction", 1, 8),
     F_ARRAY("restitution", 1, 8),
+    F_ARRAY("gravity_scale", 1, 8),
+    F_ARRAY("linear_damping", 1, 8),
+    F_ARRAY("angular_damping", 1, 8),
+    F_ARRAY("sensor", 1, 1),
     F_ARRAY("filter_category", 1, 4),
     F_ARRAY("filter_mask", 1, 4),
     F_ARRAY("filter_group", 1, 4),
@@ -103,6 +107,19 @@ static const field scene_fields[] = {
     F_ARRAY("joint_body_b", 4, 4),
     F_TIMES("num_anchor_coords", 2, 4),
     F_ARRAY("anchor", 4, 16),
+    F_ARRAY("anchor_b", 4, 16),
+    F_ARRAY("axis", 4, 16),
+    F_ARRAY("joint_collide", 4, 1),
+    F_ARRAY("joint_lower", 4, 8),
+    F_ARRAY("joint_upper", 4, 8),
+    F_ARRAY("joint_restitution", 4, 8),
+    F_ARRAY("stiffness", 4, 8),
+    F_ARRAY("joint_damping", 4, 8),
+    F_ARRAY("rest", 4, 8),
+    F_ARRAY("motor_speed", 4, 8),
+    F_ARRAY("motor_limit", 4, 8),
+    F_ARRAY("break_force", 4, 8),
+    F_ARRAY("break_torque", 4, 8),
     F_END,
 };
 
@@ -169,6 +186,19 @@ static const field gradient_fields[] = {
     F_DOUBLES("vertices", 10),
     F_DOUBLES("anchors", 11),
     F_DOUBLES("dt", 12),
+    F_DOUBLES("gravity_scale", 13),
+    F_DOUBLES("linear_damping", 14),
+    F_DOUBLES("angular_damping", 15),
+    F_DOUBLES("axes", 16),
+    F_DOUBLES("angles", 17),
+    F_DOUBLES("lengths", 18),
+    F_DOUBLES("lower", 19),
+    F_DOUBLES("upper", 20),
+    F_DOUBLES("stiffness", 21),
+    F_DOUBLES("damping", 22),
+    F_DOUBLES("rest", 23),
+    F_DOUBLES("motor_speed", 24),
+    F_DOUBLES("motor_limit", 25),
     F_END,
 };
 

@@ -94,6 +94,58 @@ static void send_gives_what_run_gives(void **state)
     stop_server(&s);
 }
 
+/* All scenes of the tests, the large ones for some steps. */
+static void every_scene_travels(void **state)
+{
+    (void)state;
+    static const char *const scenes[] = {
+        "a_slide",  "b_incline_stick",   "c_slide_roll", "d_bounce_e80", "e_cradle",
+        "f_double", "f_pendulum",        "g_stack10",    "g_stack30",    "h_ratio1e3",
+        "h_tower4", "i_pyramid10",       "i_pyramid50",  "j_pile100",    "k_oblique_stick",
+        "l_arch12", "n_chain_heavy_hang"};
+    server s = start_server();
+    for (size_t k = 0; k < sizeof scenes / sizeof scenes[0]; k++) {
+        char arguments[96];
+        const int large = strncmp(scenes[k], "i_pyramid50", 11) == 0;
+        snprintf(arguments, sizeof arguments, "%%/scenes/%s.json --duration %s", scenes[k],
+                 large ? "0.1" : "0.5");
+        compare_with_run(&s, arguments);
+    }
+    stop_server(&s);
+}
+
+/* One of each kind of joint, with all that it can have; what it says of itself must count. */
+static void every_joint_travels(void **state)
+{
+    (void)state;
+    static const char *const joints[] = {
+        "\"type\":\"revolute\",\"lower\":-0.2,\"upper\":0.3,\"restitution\":0.5",
+        "\"type\":\"revolute\",\"stiffness\":30,\"damping\":0.7,\"rest\":0.4",
+        "\"type\":\"revolute\",\"motor_speed\":3,\"motor_limit\":40,\"collide\":true",
+        "\"type\":\"prismatic\",\"axis\":[1,0.4],\"lower\":-0.1,\"upper\":0.2",
+        "\"type\":\"weld\"",
+        "\"type\":\"wheel\",\"axis\":[0.2,1],\"stiffness\":400,\"damping\":5",
+        "\"type\":\"distance\",\"anchor_b\":[1.4,0.2]",
+        "\"type\":\"rope\",\"anchor_b\":[1.4,0.2],\"upper\":2,\"restitution\":0.3",
+        "\"type\":\"target\",\"stiffness\":50,\"damping\":2",
+        "\"type\":\"lock_x\"",
+        "\"type\":\"lock_y\"",
+        "\"type\":\"lock_angle\""};
+    server s = start_server();
+    for (size_t k = 0; k < sizeof joints / sizeof joints[0]; k++) {
+        char text[1024];
+        snprintf(text, sizeof text,
+                 "{\"format\":\"carom-scene/1\",\"dt\":0.01,\"duration\":1,\"sample\":0.1,"
+                 "\"bodies\":[{\"mass\":2,\"inertia\":1,\"velocity\":[0.3,1]},"
+                 "{\"mass\":1,\"inertia\":0.3,\"position\":[1.2,0],\"angular_velocity\":2}],"
+                 "\"joints\":[{%s,\"body_a\":0,\"body_b\":1,\"anchor\":[0.7,0.1]}]}",
+                 joints[k]);
+        program_write("joint.json", text);
+        compare_with_run(&s, "joint.json");
+    }
+    stop_server(&s);
+}
+
 static void send_tells_what_went_wrong(void **state)
 {
     (void)state;
@@ -186,6 +238,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(send_gives_what_run_gives),
+        cmocka_unit_test(every_scene_travels),
+        cmocka_unit_test(every_joint_travels),
         cmocka_unit_test(send_tells_what_went_wrong),
         cmocka_unit_test(interrupted_runs_keep_their_last_state),
         cmocka_unit_test(watch_hears_the_bus),

@@ -117,12 +117,6 @@ static int run(const crm_arguments *a)
     crm_run plan;
     int code = crm_load(a, &plan);
     if (code != CRM_DONE) return code;
-    char why[256];
-    if (!crm_scene_travels(plan.scene, why, sizeof why)) {
-        fprintf(stderr, "%s: %s\n", plan.file, why);
-        crm_unload(&plan);
-        return CRM_USAGE;
-    }
     carom_client *client = carom_client_create();
     code = CRM_FAILED;
     if (!client) {

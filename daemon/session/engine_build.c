@@ -60,9 +60,10 @@ static carom_status check_joints(const carom_scene_t *s, char *text)
 {
     for (int k = 0; k < s->num_joints; k++) {
         const int a = s->joint_body_a[k], b = s->joint_body_b[k];
-        if (s->joint_type[k] != CAROM_SCENE_T_REVOLUTE) {
-            return crm_engine_fault(CAROM_E_ARGUMENT, text, "joint_type[%d] = %d: 0 revolute", k,
-                                    s->joint_type[k]);
+        if (!carom_joint_kind_name((carom_joint_kind)s->joint_type[k])) {
+            return crm_engine_fault(CAROM_E_ARGUMENT, text,
+                                    "joint_type[%d] = %d: 0 revolute to %d lock_angle", k,
+                                    s->joint_type[k], CAROM_SCENE_T_LOCK_ANGLE);
         }
         if (a < 0 || a >= s->num_bodies || b < 0 || b >= s->num_bodies || a == b) {
             return crm_engine_fault(CAROM_E_ARGUMENT, text,
@@ -115,6 +116,10 @@ static carom_body_def body_def(const carom_scene_t *s, int i)
     d.inertia = s->inertia[i];
     d.friction = s->friction[i];
     d.restitution = s->restitution[i];
+    d.gravity_scale = s->gravity_scale[i];
+    d.linear_damping = s->linear_damping[i];
+    d.angular_damping = s->angular_damping[i];
+    d.sensor = s->sensor[i] != 0;
     d.collide = s->collide[i] != 0;
     d.filter.category = (unsigned)s->filter_category[i];
     d.filter.mask = (unsigned)s->filter_mask[i];
@@ -156,12 +161,34 @@ static carom_status add_bodies(const carom_scene_t *s, const carom_shape *shapes
     return CAROM_OK;
 }
 
+/* The kinds have the same numbers on the wire. */
+static carom_joint_def joint_def(const carom_scene_t *s, int k)
+{
+    carom_joint_def d = carom_joint_defaults((carom_joint_kind)s->joint_type[k]);
+    d.body_a = s->joint_body_a[k];
+    d.body_b = s->joint_body_b[k];
+    d.anchor = (carom_vec2){s->anchor[2 * k], s->anchor[2 * k + 1]};
+    d.anchor_b = (carom_vec2){s->anchor_b[2 * k], s->anchor_b[2 * k + 1]};
+    d.axis = (carom_vec2){s->axis[2 * k], s->axis[2 * k + 1]};
+    d.collide = s->joint_collide[k] != 0;
+    d.lower = s->joint_lower[k];
+    d.upper = s->joint_upper[k];
+    d.restitution = s->joint_restitution[k];
+    d.stiffness = s->stiffness[k];
+    d.damping = s->joint_damping[k];
+    d.rest = s->rest[k];
+    d.motor_speed = s->motor_speed[k];
+    d.motor_limit = s->motor_limit[k];
+    d.break_force = s->break_force[k];
+    d.break_torque = s->break_torque[k];
+    return d;
+}
+
 static carom_status add_joints(const carom_scene_t *s, carom_world *world, char *text)
 {
     for (int k = 0; k < s->num_joints; k++) {
-        const carom_vec2 at = {s->anchor[2 * k], s->anchor[2 * k + 1]};
-        const carom_status status =
-            carom_world_add_revolute(world, s->joint_body_a[k], s->joint_body_b[k], at, NULL);
+        const carom_joint_def d = joint_def(s, k);
+        const carom_status status = carom_world_add_joint(world, &d, NULL);
         if (status < 0) return world_fault(world, status, text);
     }
     return CAROM_OK;

@@ -51,6 +51,11 @@ static size_t two_per_vertex(const crm_engine *e)
     return (size_t)e->scene->num_vertex_coords;
 }
 
+static size_t one_per_joint(const crm_engine *e)
+{
+    return (size_t)e->scene->num_joints;
+}
+
 static size_t four_per_joint(const crm_engine *e)
 {
     return 4 * (size_t)e->scene->num_joints;
@@ -77,6 +82,19 @@ static const parameter parameters[] = {
     PARAMETER(vertices, VERTICES, two_per_vertex),
     PARAMETER(anchors, ANCHORS, four_per_joint),
     PARAMETER(dt, DT, one),
+    PARAMETER(gravity_scale, GRAVITY_SCALE, one_per_body),
+    PARAMETER(linear_damping, LINEAR_DAMPING, one_per_body),
+    PARAMETER(angular_damping, ANGULAR_DAMPING, one_per_body),
+    PARAMETER(axes, AXES, one_per_joint),
+    PARAMETER(angles, ANGLES, one_per_joint),
+    PARAMETER(lengths, LENGTHS, one_per_joint),
+    PARAMETER(lower, LOWER, one_per_joint),
+    PARAMETER(upper, UPPER, one_per_joint),
+    PARAMETER(stiffness, STIFFNESS, one_per_joint),
+    PARAMETER(damping, DAMPING, one_per_joint),
+    PARAMETER(rest, REST, one_per_joint),
+    PARAMETER(motor_speed, MOTOR_SPEED, one_per_joint),
+    PARAMETER(motor_limit, MOTOR_LIMIT, one_per_joint),
 };
 
 enum { N_PARAMETERS = sizeof parameters / sizeof parameters[0] };
@@ -181,6 +199,19 @@ static carom_gradient gradient_view(const carom_parameter_gradient_t *m)
     g.vertices = (carom_vec2 *)(void *)wanted(m->vertices, w & CAROM_PARAMETER_GRADIENT_T_VERTICES);
     g.anchors = (carom_vec2 *)(void *)wanted(m->anchors, w & CAROM_PARAMETER_GRADIENT_T_ANCHORS);
     g.dt = wanted(m->dt, w & CAROM_PARAMETER_GRADIENT_T_DT);
+    g.gravity_scale = wanted(m->gravity_scale, w & CAROM_PARAMETER_GRADIENT_T_GRAVITY_SCALE);
+    g.linear_damping = wanted(m->linear_damping, w & CAROM_PARAMETER_GRADIENT_T_LINEAR_DAMPING);
+    g.angular_damping = wanted(m->angular_damping, w & CAROM_PARAMETER_GRADIENT_T_ANGULAR_DAMPING);
+    g.axes = wanted(m->axes, w & CAROM_PARAMETER_GRADIENT_T_AXES);
+    g.angles = wanted(m->angles, w & CAROM_PARAMETER_GRADIENT_T_ANGLES);
+    g.lengths = wanted(m->lengths, w & CAROM_PARAMETER_GRADIENT_T_LENGTHS);
+    g.lower = wanted(m->lower, w & CAROM_PARAMETER_GRADIENT_T_LOWER);
+    g.upper = wanted(m->upper, w & CAROM_PARAMETER_GRADIENT_T_UPPER);
+    g.stiffness = wanted(m->stiffness, w & CAROM_PARAMETER_GRADIENT_T_STIFFNESS);
+    g.damping = wanted(m->damping, w & CAROM_PARAMETER_GRADIENT_T_DAMPING);
+    g.rest = wanted(m->rest, w & CAROM_PARAMETER_GRADIENT_T_REST);
+    g.motor_speed = wanted(m->motor_speed, w & CAROM_PARAMETER_GRADIENT_T_MOTOR_SPEED);
+    g.motor_limit = wanted(m->motor_limit, w & CAROM_PARAMETER_GRADIENT_T_MOTOR_LIMIT);
     return g;
 }
 
@@ -233,6 +264,10 @@ static carom_status check_descent(const crm_engine *e, const carom_parameter_gra
     if (d->wanted & (CAROM_PARAMETER_GRADIENT_T_FORCE_STEPS | CAROM_PARAMETER_GRADIENT_T_DT)) {
         return crm_engine_fault(CAROM_E_ARGUMENT, text,
                                 "force_steps belong to the step requests, dt to the settings");
+    }
+    if (d->wanted & (CAROM_PARAMETER_GRADIENT_T_ANGLES | CAROM_PARAMETER_GRADIENT_T_LENGTHS)) {
+        return crm_engine_fault(CAROM_E_ARGUMENT, text,
+                                "angles and lengths of joints follow from poses and anchors");
     }
     if (unknown_bits(d->wanted)) return unknown_wanted(d->wanted, text);
     carom_parameter_gradient_t view = *d;
@@ -326,13 +361,19 @@ static carom_vec2 carried(const double *q, const double *p, int i, carom_vec2 w)
     return (carom_vec2){p[3 * i + 1] + r.x, p[3 * i + 2] + r.y};
 }
 
-/* A joint is given by one world point w at the poses q; its anchors in the two frames follow,
+static int has_two_points(const carom_scene_t *s, int k)
+{
+    return s->joint_type[k] == CAROM_SCENE_T_DISTANCE || s->joint_type[k] == CAROM_SCENE_T_ROPE;
+}
+
+/* Most joints are given by one world point w at the poses q; the anchors in the two frames follow,
  * a = R_a' (w - x_a) and b = R_b' (w - x_b), so that dl/dw = R_a dl/da + R_b dl/db.
  * Where the poses move to p, the point goes with its bodies: the mean of where the two take it. */
 static void descend_anchors(carom_scene_t *s, const double *q, const carom_parameter_gradient_t *d)
 {
     for (int k = 0; k < s->num_joints; k++) {
         const int a = s->joint_body_a[k], b = s->joint_body_b[k];
+        if (has_two_points(s, k)) continue;
         carom_vec2 w = {s->anchor[2 * k], s->anchor[2 * k + 1]};
         if (d->wanted & CAROM_PARAMETER_GRADIENT_T_ANCHORS) {
             const double *g = d->anchors + 4 * k;
@@ -345,8 +386,88 @@ static void descend_anchors(carom_scene_t *s, const double *q, const carom_param
             const carom_vec2 wa = carried(q, s->q, a, w), wb = carried(q, s->q, b, w);
             w = (carom_vec2){0.5 * (wa.x + wb.x), 0.5 * (wa.y + wb.y)};
         }
-        s->anchor[2 * k] = w.x;
-        s->anchor[2 * k + 1] = w.y;
+        s->anchor[2 * k] = s->anchor_b[2 * k] = w.x;
+        s->anchor[2 * k + 1] = s->anchor_b[2 * k + 1] = w.y;
+    }
+}
+
+/* The anchor *w in body i moves with its own gradient, and goes with its body. */
+static void descend_point(const carom_scene_t *s, const double *q,
+                          const carom_parameter_gradient_t *d, int i, const double *g, double *w)
+{
+    carom_vec2 x = {w[0], w[1]};
+    if (d->wanted & CAROM_PARAMETER_GRADIENT_T_ANCHORS) {
+        const carom_vec2 turned = rotate(q, i, (carom_vec2){g[0], g[1]});
+        x.x -= d->rate * turned.x;
+        x.y -= d->rate * turned.y;
+    }
+    if (d->wanted & CAROM_PARAMETER_GRADIENT_T_Q0) x = carried(q, s->q, i, x);
+    w[0] = x.x;
+    w[1] = x.y;
+}
+
+static void descend_two_points(carom_scene_t *s, const double *q,
+                               const carom_parameter_gradient_t *d)
+{
+    for (int k = 0; k < s->num_joints; k++) {
+        const double *g =
+            d->wanted & CAROM_PARAMETER_GRADIENT_T_ANCHORS ? d->anchors + 4 * k : NULL;
+        if (!has_two_points(s, k)) continue;
+        descend_point(s, q, d, s->joint_body_a[k], g, &s->anchor[2 * k]);
+        descend_point(s, q, d, s->joint_body_b[k], g ? g + 2 : NULL, &s->anchor_b[2 * k]);
+    }
+}
+
+/* An axis turns by its own gradient, and with body A. */
+static void descend_axes(carom_scene_t *s, const double *q, const carom_parameter_gradient_t *d)
+{
+    for (int k = 0; k < s->num_joints; k++) {
+        const int a = s->joint_body_a[k];
+        double turn = s->q[3 * a] - q[3 * a];
+        if (d->wanted & CAROM_PARAMETER_GRADIENT_T_AXES) turn -= d->rate * d->axes[k];
+        if (turn == 0) continue;
+        const double x = s->axis[2 * k], y = s->axis[2 * k + 1];
+        s->axis[2 * k] = cos(turn) * x - sin(turn) * y;
+        s->axis[2 * k + 1] = sin(turn) * x + cos(turn) * y;
+    }
+}
+
+/* Springs, limits and motors. */
+static void descend_drives(carom_scene_t *s, const carom_parameter_gradient_t *d)
+{
+    const int w = d->wanted, n = s->num_joints;
+    const double rate = d->rate;
+    if (w & CAROM_PARAMETER_GRADIENT_T_LOWER) descend_array(s->joint_lower, d->lower, n, rate);
+    if (w & CAROM_PARAMETER_GRADIENT_T_UPPER) descend_array(s->joint_upper, d->upper, n, rate);
+    if (w & CAROM_PARAMETER_GRADIENT_T_REST) descend_array(s->rest, d->rest, n, rate);
+    if (w & CAROM_PARAMETER_GRADIENT_T_MOTOR_SPEED) {
+        descend_array(s->motor_speed, d->motor_speed, n, rate);
+    }
+    if (w & CAROM_PARAMETER_GRADIENT_T_STIFFNESS) {
+        descend_positive(s->stiffness, d->stiffness, n, rate);
+    }
+    if (w & CAROM_PARAMETER_GRADIENT_T_DAMPING) {
+        descend_clamped(s->joint_damping, d->damping, n, rate, HUGE_VAL);
+    }
+    if (w & CAROM_PARAMETER_GRADIENT_T_MOTOR_LIMIT) {
+        descend_positive(s->motor_limit, d->motor_limit, n, rate);
+    }
+}
+
+/* What acts on bodies without touching them. */
+static void descend_weights(carom_scene_t *s, const carom_parameter_gradient_t *d)
+{
+    const int w = d->wanted, n = s->num_bodies;
+    if (w & CAROM_PARAMETER_GRADIENT_T_GRAVITY) descend_array(s->gravity, d->gravity, 2, d->rate);
+    if (w & CAROM_PARAMETER_GRADIENT_T_FORCE) descend_array(s->force, d->force, 3 * n, d->rate);
+    if (w & CAROM_PARAMETER_GRADIENT_T_GRAVITY_SCALE) {
+        descend_array(s->gravity_scale, d->gravity_scale, n, d->rate);
+    }
+    if (w & CAROM_PARAMETER_GRADIENT_T_LINEAR_DAMPING) {
+        descend_clamped(s->linear_damping, d->linear_damping, n, d->rate, HUGE_VAL);
+    }
+    if (w & CAROM_PARAMETER_GRADIENT_T_ANGULAR_DAMPING) {
+        descend_clamped(s->angular_damping, d->angular_damping, n, d->rate, HUGE_VAL);
     }
 }
 
@@ -363,13 +484,15 @@ static void descend_scene(carom_scene_t *s, const double *q, const carom_paramet
     if (w & CAROM_PARAMETER_GRADIENT_T_RESTITUTION) {
         descend_clamped(s->restitution, d->restitution, n, rate, 1);
     }
-    if (w & CAROM_PARAMETER_GRADIENT_T_GRAVITY) descend_array(s->gravity, d->gravity, 2, rate);
-    if (w & CAROM_PARAMETER_GRADIENT_T_FORCE) descend_array(s->force, d->force, 3 * n, rate);
+    descend_weights(s, d);
     if (w & CAROM_PARAMETER_GRADIENT_T_RADIUS) descend_radii(s, d->radius, rate);
     if (w & CAROM_PARAMETER_GRADIENT_T_VERTICES) {
         descend_array(s->vertices, d->vertices, s->num_vertex_coords, rate);
     }
     descend_anchors(s, q, d);
+    descend_two_points(s, q, d);
+    descend_axes(s, q, d);
+    descend_drives(s, d);
 }
 
 /* The world of `scene`, in the present state when it is kept. */

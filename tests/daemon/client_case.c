@@ -16,7 +16,7 @@ carom_client_scene case_scene(void)
     static const double x[] = {0, -0.6, 0.5, 0.5}, y[] = {-1, 0.3, 0.35, 1.1};
     static const char *const names[] = {"dt"}, *const values[] = {"0.01"};
     static carom_body_def bodies[CASE_BODIES];
-    static const carom_client_joint joints[] = {{2, 3, {0.5, 0.7}}};
+    static carom_joint_def joints[1];
     carom_client_scene s;
     memset(&s, 0, sizeof s);
     for (int i = 0; i < CASE_BODIES; i++) {
@@ -37,6 +37,11 @@ carom_client_scene case_scene(void)
     s.setting_values = values;
     s.n_bodies = CASE_BODIES;
     s.bodies = bodies;
+    joints[0] = carom_joint_defaults(CAROM_REVOLUTE);
+    joints[0].body_a = 2;
+    joints[0].body_b = 3;
+    joints[0].anchor.x = 0.5;
+    joints[0].anchor.y = 0.7;
     s.n_joints = 1;
     s.joints = joints;
     return s;
@@ -53,8 +58,7 @@ static carom_world *direct_world(void)
     for (int i = 0; i < s.n_bodies; i++) {
         assert_true(carom_world_add_body(w, &s.bodies[i], NULL) >= 0);
     }
-    const carom_client_joint *j = s.joints;
-    assert_true(carom_world_add_revolute(w, j->body_a, j->body_b, j->anchor, NULL) >= 0);
+    assert_true(carom_world_add_joint(w, s.joints, NULL) >= 0);
     return w;
 }
 

@@ -1,5 +1,6 @@
 #include "messages.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,7 +20,10 @@ carom_scene_t scene_of(int64_t client_id, int32_t session, int64_t seq)
     static double vertices[] = {-9, -1, 9, -1, 9, 1, -9, 1, 0, 0, 0, 0, -0.5, 0, 0.5, 0};
     static int8_t joint_type[] = {CAROM_SCENE_T_REVOLUTE};
     static int32_t joint_a[] = {0}, joint_b[] = {3};
-    static double anchor[] = {2.5, 2};
+    static double anchor[] = {2.5, 2}, axis[] = {1, 0};
+    static double scale[] = {1, 1, 1, 1}, none[] = {0, 0, 0, 0};
+    static int8_t no[] = {0, 0, 0, 0};
+    static double low[] = {-HUGE_VAL}, high[] = {HUGE_VAL};
     carom_scene_t m = {0};
     m.client_id = client_id;
     m.session = session;
@@ -37,6 +41,10 @@ carom_scene_t scene_of(int64_t client_id, int32_t session, int64_t seq)
     m.inertia = inertia;
     m.friction = friction;
     m.restitution = restitution;
+    m.gravity_scale = scale;
+    m.linear_damping = none;
+    m.angular_damping = none;
+    m.sensor = no;
     m.filter_category = category;
     m.filter_mask = mask;
     m.filter_group = group;
@@ -56,6 +64,14 @@ carom_scene_t scene_of(int64_t client_id, int32_t session, int64_t seq)
     m.joint_body_b = joint_b;
     m.num_anchor_coords = 2;
     m.anchor = anchor;
+    m.anchor_b = anchor;
+    m.axis = axis;
+    m.joint_collide = no;
+    m.joint_lower = low;
+    m.joint_upper = high;
+    m.joint_restitution = m.stiffness = m.joint_damping = m.rest = none;
+    m.motor_speed = m.motor_limit = none;
+    m.break_force = m.break_torque = high;
     return m;
 }
 
@@ -86,6 +102,10 @@ bytes pack_row(int64_t client_id, int32_t session, int64_t seq, int n)
     m.inertia = zeros(list, &k, u, sizeof(double));
     m.friction = zeros(list, &k, u, sizeof(double));
     m.restitution = zeros(list, &k, u, sizeof(double));
+    m.gravity_scale = zeros(list, &k, u, sizeof(double));
+    m.linear_damping = zeros(list, &k, u, sizeof(double));
+    m.angular_damping = zeros(list, &k, u, sizeof(double));
+    m.sensor = zeros(list, &k, u, 1);
     m.filter_category = zeros(list, &k, u, 4);
     m.filter_mask = zeros(list, &k, u, 4);
     m.filter_group = zeros(list, &k, u, 4);

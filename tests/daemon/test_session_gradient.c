@@ -222,9 +222,9 @@ static void bad_descents_are_refused(void **state)
     d = descent_of(5, CAROM_PARAMETER_GRADIENT_T_FORCE_STEPS, 1);
     bench_do(b, pack_descent(&d));
     expect_reply(b, CAROM_REPLY_T_REFUSED, 5, 6, "force_steps");
-    d = descent_of(6, 1 << 20, 1);
+    d = descent_of(6, 1 << 26, 1);
     bench_do(b, pack_descent(&d));
-    expect_reply(b, CAROM_REPLY_T_REFUSED, 6, 7, "the bits 1048576 name no parameter");
+    expect_reply(b, CAROM_REPLY_T_REFUSED, 6, 7, "the bits 67108864 name no parameter");
     d = descent_of(7, CAROM_PARAMETER_GRADIENT_T_Q0, 1);
     d.num_q0 = 12;
     d.q0 = vertices;

@@ -13,7 +13,7 @@ typedef struct bad_scene {
 static int8_t bad_types[] = {1, 0, 3, 0};
 static int32_t bad_owner[] = {0, 1, 4, 3}, bad_order[] = {0, 2, 1, 3}, bad_count[] = {4, 1, 1, 3};
 static int32_t none[] = {4, 0, 2, 2}, same_body[] = {3};
-static int8_t bad_joint[] = {9};
+static int8_t bad_joint[] = {10};
 static double bad_mass[] = {1, -2, 3, 1};
 static char *bad_names[] = {(char *)"no_such_setting"};
 
@@ -68,7 +68,7 @@ static const bad_scene bad_scenes[] = {
     {"must not decrease", spoil_order},
     {"the shapes have 9 vertices", spoil_count},
     {"shape_num_vertices[1] = 0", spoil_vertices},
-    {"joint_type[0] = 9", spoil_joint},
+    {"joint_type[0] = 10", spoil_joint},
     {"joint 0 between bodies 3 and 3", spoil_bodies},
     {"'left'", spoil_mass},
     {"'no_such_setting'", spoil_setting},

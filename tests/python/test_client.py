@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 import os
 import signal
 import tempfile
@@ -59,6 +60,53 @@ class Blocking(WithServer):
         for n, state in enumerate(states, 1):
             self.assertAlmostEqual(state.q[0, 1], 0.75 * n + 2.5 * 0.0625 * n * (n + 1) / 2, delta=1e-14)
             self.assertEqual(state.time, 0.25 * n)
+
+    def test_damped_locked_and_sensing_bodies(self):
+        scene = Scene(gravity=(0, -10), dt=1 / 60)
+        damped = scene.dynamic(circle(0.1), mass=1, velocity=(3, 0), linear_damping=2, gravity_scale=0)
+        locked = scene.dynamic(circle(0.1), position=(5, 0), mass=1, inertia=math.inf,
+                               forces=[7, 0, 0], gravity_scale=0.5)
+        scene.static(box(9, 1), position=(5, -1), sensor=True)
+        self.client.open(scene)
+        state = self.client.step(60, every=0, record=True)[-1]
+        self.assertAlmostEqual(state.v[damped, 1], 3 * math.exp(-2), delta=1e-14)
+        self.assertEqual(state.q[locked, 0], 0)
+        self.assertAlmostEqual(state.q[locked, 2], -2.5, delta=1e-13)  # through the sensor
+        bar = np.zeros((3, 3))
+        bar[damped, 1] = 1
+        g = self.client.gradient({60: (None, bar)}, wrt=("linear_damping", "gravity_scale"))
+        self.assertAlmostEqual(g.linear_damping[damped], -3 * math.exp(-2), delta=1e-13)
+        self.assertEqual(self.client.descend(g, 0.1, wrt=("linear_damping",)).linear_damping[damped],
+                         2 - 0.1 * g.linear_damping[damped])
+
+    def test_parameters_of_joints(self):
+        # m x'' = -k x from 1: d x / dk = -t sin(w t) / (2 m w), but for h^2
+        scene = Scene(gravity=(0, 0), dt=1 / 2000)
+        rail = scene.static()
+        cart = scene.dynamic(position=(1, 0), mass=2, inertia=1)
+        scene.join("prismatic", rail, cart, (1, 0), axis=(1, 0), stiffness=18, rest=-1)
+        self.client.open(scene)
+        self.client.step(2000, every=0, record=True)
+        bar = np.zeros((2, 3))
+        bar[cart, 1] = 1
+        g = self.client.gradient({2000: (bar, None)}, wrt=("stiffness", "rest", "axes"))
+        self.assertAlmostEqual(g.stiffness[0], -math.sin(3) / 12, delta=1e-6)
+        self.assertAlmostEqual(g.rest[0], 1 - math.cos(3), delta=1e-6)
+        after = self.client.descend(g, 2.0, wrt=("stiffness",))
+        self.assertEqual(after.stiffness[0], 18 - 2 * g.stiffness[0])
+        with self.assertRaisesRegex(Refused, "follow from poses"):
+            self.client.step(1, record=True)
+            g = self.client.gradient({1: (bar, None)}, wrt=("lengths",))
+            self.client.descend(g, 1.0, wrt=("lengths",))
+
+    def test_joints_break(self):
+        scene = Scene(gravity=(0, -10), dt=1 / 60)
+        hook = scene.static()
+        ball = scene.dynamic(position=(0, -1), mass=1, inertia=1)
+        scene.join("distance", hook, ball, (0, 0), anchor_b=(0, -1), break_force=9.9)
+        self.client.open(scene)
+        state = self.client.step(61, every=0)[-1]
+        self.assertAlmostEqual(state.q[ball, 2], -6, delta=1e-12)  # falls from the second step on
 
     def test_gradient_of_the_free_body(self):
         self.client.open(free_body())

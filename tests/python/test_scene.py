@@ -107,6 +107,35 @@ class Mistakes(unittest.TestCase):
         self.refused(lambda: scene.pin(floor, wall, (0, 0)), "neither body is dynamic")
         self.assertEqual(scene.joints, [])
 
+    def test_fields_of_joints(self):
+        scene = Scene()
+        a, b = scene.dynamic(circle(1), mass=1), scene.dynamic(circle(1), mass=1)
+        cases = [("glue", {}, "type: must be one of"), ("weld", {"stiffness": 1}, "stiffness: a weld joint has"),
+                 ("prismatic", {}, "axis: must be given"), ("rope", {}, "anchor_b: must be given"),
+                 ("wheel", {"axis": (0, 0)}, "axis: is no direction"),
+                 ("revolute", {"lower": 1, "upper": 0}, "lower: must be below upper"),
+                 ("revolute", {"motor_limit": -1}, "motor_limit: must be >= 0"),
+                 ("target", {}, "stiffness: must be given"),
+                 ("revolute", {"break_force": 0}, "break_force: must be > 0")]
+        for kind, fields, text in cases:
+            self.refused(lambda: scene.join(kind, a, b, (0, 0), **fields), text)
+        self.assertEqual(scene.joints, [])
+
+    def test_joints_go_to_files_and_back(self):
+        scene = Scene()
+        a, b = scene.dynamic(circle(1), mass=1), scene.dynamic(circle(1), mass=1)
+        scene.join("wheel", a, b, (0, 1), axis=(0, 2), lower=-1, stiffness=3, motor_limit=2, name="w")
+        scene.join("rope", a, b, (0, 1), anchor_b=(1, 1), upper=4, collide=False)
+        again = Scene.from_json(scene.to_json())
+        self.assertEqual(again.joints, scene.joints)
+
+    def test_what_files_do_not_hold(self):
+        scene = Scene()
+        ball = scene.dynamic(circle(1), mass=1, linear_damping=2)
+        self.refused(scene.to_json, r"bodies\[0\].linear_damping: carom-scene/1 has no such key")
+        ball.linear_damping, ball.inertia = 0.0, math.inf
+        self.refused(scene.to_json, r"bodies\[0\].inertia: carom-scene/1 has no infinite")
+
     def test_scenes(self):
         self.refused(lambda: Scene(dt=-1), "dt: must be > 0, is -1")
         self.refused(lambda: Scene(gravity=3), "gravity: must be 2 numbers")
@@ -172,7 +201,9 @@ class Files(unittest.TestCase):
                                                           "center": [1, 0]}}]},
              r"bodies\[0\].density: the centroid of the shape is at \(1, 0\)"),
             ({**HEAD, "bodies": [{**BALL, "shapes": []}]}, r"bodies\[0\].shapes: stands beside"),
-            ({**HEAD, "bodies": [BALL], "joints": [{"type": "weld"}]}, r"joints\[0\].type: must be"),
+            ({**HEAD, "bodies": [BALL], "joints": [{"type": "glue"}]}, r"joints\[0\].type: must be"),
+            ({**HEAD, "bodies": [BALL], "joints": [{"type": "weld", "axis": [1, 0]}]},
+             r"joints\[0\].axis: unknown key"),
             ({**HEAD, "bodies": [BALL], "joints": [{"type": "revolute", "body_a": 0, "body_b": 3,
                                                     "anchor": [0, 0]}]}, r"joints\[0\].body_b: there"),
         ]

@@ -131,6 +131,24 @@ static const double *given(const carom_parameter_gradient_t *m, int bit, const d
     return m->wanted & bit ? x : NULL;
 }
 
+/* Of what not every scene has. */
+static void view_more(const carom_parameter_gradient_t *m, carom_client_gradient *g)
+{
+    g->gravity_scale = given(m, CAROM_WRT_GRAVITY_SCALE, m->gravity_scale);
+    g->linear_damping = given(m, CAROM_WRT_LINEAR_DAMPING, m->linear_damping);
+    g->angular_damping = given(m, CAROM_WRT_ANGULAR_DAMPING, m->angular_damping);
+    g->axes = given(m, CAROM_WRT_AXES, m->axes);
+    g->angles = given(m, CAROM_WRT_ANGLES, m->angles);
+    g->lengths = given(m, CAROM_WRT_LENGTHS, m->lengths);
+    g->lower = given(m, CAROM_WRT_LOWER, m->lower);
+    g->upper = given(m, CAROM_WRT_UPPER, m->upper);
+    g->stiffness = given(m, CAROM_WRT_STIFFNESS, m->stiffness);
+    g->damping = given(m, CAROM_WRT_DAMPING, m->damping);
+    g->rest = given(m, CAROM_WRT_REST, m->rest);
+    g->motor_speed = given(m, CAROM_WRT_MOTOR_SPEED, m->motor_speed);
+    g->motor_limit = given(m, CAROM_WRT_MOTOR_LIMIT, m->motor_limit);
+}
+
 static void view_gradient(const carom_client *c, carom_client_gradient *g)
 {
     const carom_parameter_gradient_t *m = &c->gradient;
@@ -157,6 +175,7 @@ static void view_gradient(const carom_client *c, carom_client_gradient *g)
     g->vertices = given(m, CAROM_WRT_VERTICES, m->vertices);
     g->anchors = given(m, CAROM_WRT_ANCHORS, m->anchors);
     g->dt = given(m, CAROM_WRT_DT, m->dt);
+    view_more(m, g);
 }
 
 /* 1: the arrays have the sizes that the scene implies. */
@@ -182,6 +201,19 @@ static int sizes_fit(const carom_client *c)
         {CAROM_WRT_VERTICES, m->num_vertices, s->num_vertex_coords},
         {CAROM_WRT_ANCHORS, m->num_anchors, 4 * (int64_t)s->num_joints},
         {CAROM_WRT_DT, m->num_dt, 1},
+        {CAROM_WRT_GRAVITY_SCALE, m->num_gravity_scale, n},
+        {CAROM_WRT_LINEAR_DAMPING, m->num_linear_damping, n},
+        {CAROM_WRT_ANGULAR_DAMPING, m->num_angular_damping, n},
+        {CAROM_WRT_AXES, m->num_axes, s->num_joints},
+        {CAROM_WRT_ANGLES, m->num_angles, s->num_joints},
+        {CAROM_WRT_LENGTHS, m->num_lengths, s->num_joints},
+        {CAROM_WRT_LOWER, m->num_lower, s->num_joints},
+        {CAROM_WRT_UPPER, m->num_upper, s->num_joints},
+        {CAROM_WRT_STIFFNESS, m->num_stiffness, s->num_joints},
+        {CAROM_WRT_DAMPING, m->num_damping, s->num_joints},
+        {CAROM_WRT_REST, m->num_rest, s->num_joints},
+        {CAROM_WRT_MOTOR_SPEED, m->num_motor_speed, s->num_joints},
+        {CAROM_WRT_MOTOR_LIMIT, m->num_motor_limit, s->num_joints},
     };
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         if (sizes[i].has != (w & sizes[i].bit ? sizes[i].needs : 0)) return 0;
@@ -242,6 +274,28 @@ static void place(unsigned wanted, unsigned bit, const double *x, int64_t n, int
     *array = (double *)(has ? x : NULL); /* the encoder only reads */
 }
 
+static void place_more(const carom_client_gradient *g, unsigned w, carom_parameter_gradient_t *m)
+{
+    const int64_t n = g->n_bodies;
+    const int64_t j = g->n_joints;
+    place(w, CAROM_WRT_GRAVITY_SCALE, g->gravity_scale, n, &m->num_gravity_scale,
+          &m->gravity_scale);
+    place(w, CAROM_WRT_LINEAR_DAMPING, g->linear_damping, n, &m->num_linear_damping,
+          &m->linear_damping);
+    place(w, CAROM_WRT_ANGULAR_DAMPING, g->angular_damping, n, &m->num_angular_damping,
+          &m->angular_damping);
+    place(w, CAROM_WRT_AXES, g->axes, j, &m->num_axes, &m->axes);
+    place(w, CAROM_WRT_ANGLES, g->angles, j, &m->num_angles, &m->angles);
+    place(w, CAROM_WRT_LENGTHS, g->lengths, j, &m->num_lengths, &m->lengths);
+    place(w, CAROM_WRT_LOWER, g->lower, j, &m->num_lower, &m->lower);
+    place(w, CAROM_WRT_UPPER, g->upper, j, &m->num_upper, &m->upper);
+    place(w, CAROM_WRT_STIFFNESS, g->stiffness, j, &m->num_stiffness, &m->stiffness);
+    place(w, CAROM_WRT_DAMPING, g->damping, j, &m->num_damping, &m->damping);
+    place(w, CAROM_WRT_REST, g->rest, j, &m->num_rest, &m->rest);
+    place(w, CAROM_WRT_MOTOR_SPEED, g->motor_speed, j, &m->num_motor_speed, &m->motor_speed);
+    place(w, CAROM_WRT_MOTOR_LIMIT, g->motor_limit, j, &m->num_motor_limit, &m->motor_limit);
+}
+
 static void place_gradient(const carom_client_gradient *g, unsigned w,
                            carom_parameter_gradient_t *m)
 {
@@ -258,6 +312,7 @@ static void place_gradient(const carom_client_gradient *g, unsigned w,
     place(w, CAROM_WRT_VERTICES, g->vertices, 2 * (int64_t)g->n_vertices, &m->num_vertices,
           &m->vertices);
     place(w, CAROM_WRT_ANCHORS, g->anchors, 4 * (int64_t)g->n_joints, &m->num_anchors, &m->anchors);
+    place_more(g, w, m);
 }
 
 carom_client_code carom_client_descend(carom_client *c, double rate, unsigned wanted,
@@ -307,5 +362,17 @@ carom_client_parameters carom_client_get_parameters(const carom_client *c)
     p.radius = s->radius;
     p.vertices = s->vertices;
     p.anchors = s->anchor;
+    p.anchors_b = s->anchor_b;
+    p.axes = s->axis;
+    p.gravity_scale = s->gravity_scale;
+    p.linear_damping = s->linear_damping;
+    p.angular_damping = s->angular_damping;
+    p.lower = s->joint_lower;
+    p.upper = s->joint_upper;
+    p.stiffness = s->stiffness;
+    p.damping = s->joint_damping;
+    p.rest = s->rest;
+    p.motor_speed = s->motor_speed;
+    p.motor_limit = s->motor_limit;
     return p;
 }

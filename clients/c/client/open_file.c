@@ -19,10 +19,6 @@ static carom_client_code fail_file(carom_client *c, const crm_problems *problems
 static carom_client_code open_scene(carom_client *c, const crm_scene *file)
 {
     carom_client_scene scene;
-    char why[256];
-    if (!crm_scene_travels(file, why, sizeof why)) {
-        return crm_client_fail(c, CAROM_CLIENT_E_ARGUMENT, "%s", why);
-    }
     if (!crm_scene_client(file, &scene)) {
         return crm_client_fail(c, CAROM_CLIENT_E_MEMORY, "no memory for the scene");
     }

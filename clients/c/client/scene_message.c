@@ -31,6 +31,28 @@ static void count(const carom_client_scene *s, carom_scene_t *m)
     }
 }
 
+static void lay_out_joints(carom_scene_t *m, block *b)
+{
+    const int n = m->num_joints;
+    m->joint_type = take(b, n, 1);
+    m->joint_body_a = take(b, n, sizeof(int32_t));
+    m->joint_body_b = take(b, n, sizeof(int32_t));
+    m->anchor = take(b, 2 * n, sizeof(double));
+    m->anchor_b = take(b, 2 * n, sizeof(double));
+    m->axis = take(b, 2 * n, sizeof(double));
+    m->joint_collide = take(b, n, 1);
+    m->joint_lower = take(b, n, sizeof(double));
+    m->joint_upper = take(b, n, sizeof(double));
+    m->joint_restitution = take(b, n, sizeof(double));
+    m->stiffness = take(b, n, sizeof(double));
+    m->joint_damping = take(b, n, sizeof(double));
+    m->rest = take(b, n, sizeof(double));
+    m->motor_speed = take(b, n, sizeof(double));
+    m->motor_limit = take(b, n, sizeof(double));
+    m->break_force = take(b, n, sizeof(double));
+    m->break_torque = take(b, n, sizeof(double));
+}
+
 static void lay_out(carom_scene_t *m, block *b)
 {
     const int n = m->num_bodies;
@@ -43,6 +65,10 @@ static void lay_out(carom_scene_t *m, block *b)
     m->inertia = take(b, n, sizeof(double));
     m->friction = take(b, n, sizeof(double));
     m->restitution = take(b, n, sizeof(double));
+    m->gravity_scale = take(b, n, sizeof(double));
+    m->linear_damping = take(b, n, sizeof(double));
+    m->angular_damping = take(b, n, sizeof(double));
+    m->sensor = take(b, n, 1);
     m->filter_category = take(b, n, sizeof(int32_t));
     m->filter_mask = take(b, n, sizeof(int32_t));
     m->filter_group = take(b, n, sizeof(int32_t));
@@ -53,10 +79,7 @@ static void lay_out(carom_scene_t *m, block *b)
     m->shape_num_vertices = take(b, m->num_shapes, sizeof(int32_t));
     m->radius = take(b, m->num_shapes, sizeof(double));
     m->vertices = take(b, m->num_vertex_coords, sizeof(double));
-    m->joint_type = take(b, m->num_joints, 1);
-    m->joint_body_a = take(b, m->num_joints, sizeof(int32_t));
-    m->joint_body_b = take(b, m->num_joints, sizeof(int32_t));
-    m->anchor = take(b, m->num_anchor_coords, sizeof(double));
+    lay_out_joints(m, b);
 }
 
 static int32_t bits(unsigned x)
@@ -74,6 +97,10 @@ static void fill_body(carom_scene_t *m, int i, const carom_body_def *d)
     m->inertia[i] = d->inertia;
     m->friction[i] = d->friction;
     m->restitution[i] = d->restitution;
+    m->gravity_scale[i] = d->gravity_scale;
+    m->linear_damping[i] = d->linear_damping;
+    m->angular_damping[i] = d->angular_damping;
+    m->sensor[i] = d->sensor != 0;
     m->filter_category[i] = bits(d->filter.category);
     m->filter_mask[i] = bits(d->filter.mask);
     m->filter_group[i] = d->filter.group;
@@ -82,6 +109,35 @@ static void fill_body(carom_scene_t *m, int i, const carom_body_def *d)
     m->q[3 * i + 2] = d->pose.y;
     memcpy(m->v + 3 * i, d->velocity, sizeof d->velocity);
     memcpy(m->force + 3 * i, d->force, sizeof d->force);
+}
+
+static void put_vec(double *to, carom_vec2 x)
+{
+    to[0] = x.x;
+    to[1] = x.y;
+}
+
+/* The kinds have the same numbers on the wire. */
+static void fill_joint(carom_scene_t *m, int k, const carom_joint_def *d)
+{
+    const int two = d->kind == CAROM_DISTANCE || d->kind == CAROM_ROPE;
+    m->joint_type[k] = (int8_t)d->kind;
+    m->joint_body_a[k] = d->body_a;
+    m->joint_body_b[k] = d->body_b;
+    put_vec(&m->anchor[2 * k], d->anchor);
+    put_vec(&m->anchor_b[2 * k], two ? d->anchor_b : d->anchor);
+    put_vec(&m->axis[2 * k], d->axis);
+    m->joint_collide[k] = d->collide != 0;
+    m->joint_lower[k] = d->lower;
+    m->joint_upper[k] = d->upper;
+    m->joint_restitution[k] = d->restitution;
+    m->stiffness[k] = d->stiffness;
+    m->joint_damping[k] = d->damping;
+    m->rest[k] = d->rest;
+    m->motor_speed[k] = d->motor_speed;
+    m->motor_limit[k] = d->motor_limit;
+    m->break_force[k] = d->break_force;
+    m->break_torque[k] = d->break_torque;
 }
 
 static void fill(const carom_client_scene *s, carom_scene_t *m)
@@ -106,13 +162,7 @@ static void fill(const carom_client_scene *s, carom_scene_t *m)
             }
         }
     }
-    for (int k = 0; k < s->n_joints; k++) {
-        m->joint_type[k] = CAROM_SCENE_T_REVOLUTE;
-        m->joint_body_a[k] = s->joints[k].body_a;
-        m->joint_body_b[k] = s->joints[k].body_b;
-        m->anchor[2 * k] = s->joints[k].anchor.x;
-        m->anchor[2 * k + 1] = s->joints[k].anchor.y;
-    }
+    for (int k = 0; k < s->n_joints; k++) fill_joint(m, k, &s->joints[k]);
 }
 
 static carom_client_code check(carom_client *c, const carom_client_scene *s)

@@ -1,6 +1,5 @@
 #include "remote.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,54 +74,14 @@ static int put_bodies(const crm_scene *scene, carom_client_scene *out)
     return 1;
 }
 
-static int put_joints(const crm_scene *scene, carom_client_scene *out)
-{
-    const size_t n = (size_t)scene->n_joints;
-    carom_client_joint *joints = calloc(n + 1, sizeof *joints);
-    out->joints = joints;
-    if (!joints) return 0;
-    for (size_t k = 0; k < n; k++) {
-        joints[k].body_a = scene->joints[k].body_a;
-        joints[k].body_b = scene->joints[k].body_b;
-        joints[k].anchor = scene->joints[k].anchor;
-    }
-    out->n_joints = scene->n_joints;
-    return 1;
-}
-
-/* What the messages, which know pins, do not say of a joint; NULL: nothing. */
-static const char *untold(const carom_joint_def *j)
-{
-    if (j->kind != CAROM_REVOLUTE) return "";
-    if (j->lower > -HUGE_VAL || j->upper < HUGE_VAL) return " with limits";
-    if (j->stiffness > 0 || j->damping > 0) return " with a spring";
-    if (j->motor_limit > 0) return " with a motor";
-    return j->collide ? " between bodies that collide" : NULL;
-}
-
-int crm_scene_travels(const crm_scene *scene, char *why, size_t size)
-{
-    why[0] = '\0';
-    for (int k = 0; k < scene->n_joints; k++) {
-        const carom_joint_def *j = &scene->joints[k];
-        const char *what = untold(j);
-        if (!what) continue;
-        snprintf(why, size,
-                 "joints[%d]: a %s joint%s cannot be sent to a server yet; `carom run` takes it", k,
-                 carom_joint_kind_name(j->kind), what);
-        return 0;
-    }
-    return 1;
-}
-
 int crm_scene_client(const crm_scene *scene, carom_client_scene *out)
 {
     memset(out, 0, sizeof *out);
     out->name = scene->name;
     memcpy(out->gravity, scene->settings.gravity, sizeof out->gravity);
-    if (put_settings(&scene->settings, out) && put_bodies(scene, out) && put_joints(scene, out)) {
-        return 1;
-    }
+    out->joints = scene->joints;
+    out->n_joints = scene->n_joints;
+    if (put_settings(&scene->settings, out) && put_bodies(scene, out)) return 1;
     crm_scene_client_free(out);
     return 0;
 }
@@ -134,7 +93,6 @@ void crm_scene_client_free(carom_client_scene *scene)
     free((void *)scene->setting_names);
     free((void *)scene->bodies);
     free((void *)scene->body_names);
-    free((void *)scene->joints);
     memset(scene, 0, sizeof *scene);
 }
 

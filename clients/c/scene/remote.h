@@ -5,10 +5,8 @@
 #include "carom/client.h"
 #include "scene.h"
 
-/* 1: a server can be sent the scene; 0: `why` says what cannot travel, always terminated. */
-int crm_scene_travels(const crm_scene *scene, char *why, size_t size);
-/* The scene with settings as text; arrays belong to it, numbers and shapes to the crm_scene.  Force
- * tables are not part of it.  0: no memory, *out is empty. */
+/* The scene with settings as text; its texts and bodies are its own, joints and shapes the
+ * crm_scene's.  Force tables are not part of it.  0: no memory, *out is empty. */
 int crm_scene_client(const crm_scene *scene, carom_client_scene *out);
 void crm_scene_client_free(carom_client_scene *scene);
 

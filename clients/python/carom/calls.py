@@ -25,13 +25,29 @@ def scene_message(scene):
     m.num_settings = len(settings)
     _fill_bodies(m, scene, mass, inertia)
     _fill_shapes(m, scene)
-    m.num_joints = len(scene.joints)
-    m.joint_type = [scene_t.REVOLUTE] * len(scene.joints)
-    m.joint_body_a = [j.body_a for j in scene.joints]
-    m.joint_body_b = [j.body_b for j in scene.joints]
-    m.anchor = [x for j in scene.joints for x in j.anchor]
-    m.num_anchor_coords = len(m.anchor)
+    _fill_joints(m, scene.joints)
     return m
+
+
+# Numbers of a joint: in scene_t, and in Joint.
+_JOINT_NUMBERS = {"joint_lower": "lower", "joint_upper": "upper", "joint_restitution": "restitution",
+                  "joint_damping": "damping",
+                  **{key: key for key in ("stiffness", "rest", "motor_speed", "motor_limit",
+                                          "break_force", "break_torque")}}
+
+
+def _fill_joints(m, joints):
+    m.num_joints = len(joints)
+    m.joint_type = [getattr(scene_t, j.type.upper()) for j in joints]
+    m.joint_body_a = [j.body_a for j in joints]
+    m.joint_body_b = [j.body_b for j in joints]
+    m.joint_collide = [int(j.collides()) for j in joints]
+    m.anchor = [float(x) for j in joints for x in j.anchor]
+    m.anchor_b = [float(x) for j in joints for x in j.anchor_b or j.anchor]
+    m.axis = [float(x) for j in joints for x in j.axis or (1, 0)]
+    m.num_anchor_coords = len(m.anchor)
+    for key, name in _JOINT_NUMBERS.items():
+        setattr(m, key, [float(getattr(j, name)) for j in joints])
 
 
 def _setting(value):
@@ -50,6 +66,10 @@ def _fill_bodies(m, scene, mass, inertia):
     m.mass, m.inertia = mass.tolist(), inertia.tolist()
     m.friction = [float(b.friction) for b in bodies]
     m.restitution = [float(b.restitution) for b in bodies]
+    m.gravity_scale = [float(b.gravity_scale) for b in bodies]
+    m.linear_damping = [float(b.linear_damping) for b in bodies]
+    m.angular_damping = [float(b.angular_damping) for b in bodies]
+    m.sensor = [int(b.sensor) for b in bodies]
     m.filter_category = [_signed(b.filter.get("category", 1)) for b in bodies]
     m.filter_mask = [_signed(b.filter.get("mask", 0xFFFFFFFF)) for b in bodies]
     m.filter_group = [int(b.filter.get("group", 0)) for b in bodies]

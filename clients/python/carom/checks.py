@@ -11,6 +11,25 @@ from .errors import SceneError
 
 TYPES = ("dynamic", "static", "kinematic")
 
+_LIMITS = ("lower", "upper", "restitution")
+_SPRING = ("stiffness", "damping", "rest")
+_MOTOR = ("motor_speed", "motor_limit")
+# The fields that joints of a type have, beside those of all.
+JOINT_KEYS = {
+    "revolute": (*_LIMITS, *_SPRING, *_MOTOR),
+    "prismatic": ("axis", *_LIMITS, *_SPRING, *_MOTOR),
+    "weld": (),
+    "wheel": ("axis", *_LIMITS, *_SPRING, *_MOTOR),
+    "distance": ("anchor_b",),
+    "rope": ("anchor_b", *_LIMITS, *_SPRING),
+    "target": _SPRING,
+    "lock_x": (), "lock_y": (), "lock_angle": (),
+}
+# Types whose bodies may touch each other unless `collide` says otherwise.
+COLLIDING = ("distance", "rope", "target", "lock_x", "lock_y", "lock_angle")
+# Without a value: what leaves a field out.
+_PLAIN = {"anchor_b": None, "axis": None, "lower": -math.inf, "upper": math.inf}
+
 
 def number(place, value, low=-math.inf, above=False, high=math.inf):
     """A finite float from low (or above it) to high."""
@@ -80,10 +99,13 @@ def check_body(place, body):
     if body.type == "static" and (spin or any(velocity)):
         raise SceneError(f"{place}.velocity: a static body does not move; use 0, or a kinematic one")
     for key in ("mass", "inertia", "density"):
-        if getattr(body, key) is not None:
+        if getattr(body, key) is not None and not (key == "inertia" and body.inertia == math.inf):
             number(f"{place}.{key}", getattr(body, key), 0, above=True)
     number(f"{place}.friction", body.friction, 0)
     number(f"{place}.restitution", body.restitution, 0, high=1)
+    number(f"{place}.gravity_scale", body.gravity_scale)
+    number(f"{place}.linear_damping", body.linear_damping, 0)
+    number(f"{place}.angular_damping", body.angular_damping, 0)
     _check_forces(f"{place}.forces", body.forces)
     body.mass_and_inertia(place)
 
@@ -114,3 +136,32 @@ def check_joint(place, joint, bodies):
         raise SceneError(f"{place}.body_b: joins the body to itself; name another body")
     if "dynamic" not in (bodies[joint.body_a].type, bodies[joint.body_b].type):
         raise SceneError(f"{place}: neither body is dynamic; one of them must be")
+    _check_joint_fields(place, joint)
+
+
+def _check_joint_fields(place, joint):
+    if joint.type not in JOINT_KEYS:
+        raise SceneError(f"{place}.type: must be one of {', '.join(JOINT_KEYS)}, is {joint.type!r}")
+    has = JOINT_KEYS[joint.type]
+    for key in dict.fromkeys(k for keys in JOINT_KEYS.values() for k in keys):
+        if key not in has and getattr(joint, key) != _PLAIN.get(key, 0):
+            raise SceneError(f"{place}.{key}: a {joint.type} joint has none")
+    for key in ("anchor_b", "axis"):
+        if key in has:
+            if getattr(joint, key) is None:
+                raise SceneError(f"{place}.{key}: must be given")
+            setattr(joint, key, numbers(f"{place}.{key}", getattr(joint, key), 2))
+    if "axis" in has and not any(joint.axis):
+        raise SceneError(f"{place}.axis: is no direction")
+    if not joint.lower < joint.upper:
+        raise SceneError(f"{place}.lower: must be below upper, {joint.upper:g}")
+    number(f"{place}.restitution", joint.restitution, 0, high=1)
+    for key in ("stiffness", "damping", "motor_limit"):
+        number(f"{place}.{key}", getattr(joint, key), 0)
+    for key in ("rest", "motor_speed"):
+        number(f"{place}.{key}", getattr(joint, key))
+    if joint.type == "target" and not joint.stiffness > 0:
+        raise SceneError(f"{place}.stiffness: must be given: how hard the target pulls [N/m]")
+    for key in ("break_force", "break_torque"):
+        if not getattr(joint, key) > 0:
+            raise SceneError(f"{place}.{key}: must be > 0; math.inf: never")

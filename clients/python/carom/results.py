@@ -9,10 +9,13 @@ import numpy as np
 # Bits of parameter_gradient_t.wanted, in the order of its arrays.
 WRT = {"q0": 1, "v0": 2, "mass": 4, "inertia": 8, "friction": 16, "restitution": 32, "gravity": 64,
        "force": 128, "force_steps": 256, "radius": 512, "vertices": 1024, "anchors": 2048,
-       "dt": 4096}
+       "dt": 4096, "gravity_scale": 8192, "linear_damping": 16384, "angular_damping": 32768,
+       "axes": 65536, "angles": 131072, "lengths": 262144, "lower": 524288, "upper": 1048576,
+       "stiffness": 2097152, "damping": 4194304, "rest": 8388608, "motor_speed": 16777216,
+       "motor_limit": 33554432}
 
 # What has a gradient but is no parameter of a session: a descent leaves it alone.
-NO_PARAMETER = ("force_steps", "dt")
+NO_PARAMETER = ("force_steps", "dt", "angles", "lengths")
 
 # Shape of each array behind its first axis.
 _TAIL = {"q0": (3,), "v0": (3,), "force": (3,), "vertices": (2,), "anchors": (2, 2)}
@@ -93,6 +96,19 @@ class Gradient:
     vertices: np.ndarray | None = None  # (vertices, 2)
     anchors: np.ndarray | None = None  # (joints, 2, 2)
     dt: np.ndarray | None = None  # (1,): length of a step
+    gravity_scale: np.ndarray | None = None  # (n,)
+    linear_damping: np.ndarray | None = None  # (n,)
+    angular_damping: np.ndarray | None = None  # (n,)
+    axes: np.ndarray | None = None  # (joints,), like all below: angle of the line in body A
+    angles: np.ndarray | None = None  # held turns
+    lengths: np.ndarray | None = None  # held distances
+    lower: np.ndarray | None = None
+    upper: np.ndarray | None = None
+    stiffness: np.ndarray | None = None
+    damping: np.ndarray | None = None
+    rest: np.ndarray | None = None
+    motor_speed: np.ndarray | None = None
+    motor_limit: np.ndarray | None = None
     message: object = None  # the parameter_gradient_t itself
 
     def wanted(self):
@@ -126,6 +142,23 @@ class Parameters:
     radius: np.ndarray
     vertices: np.ndarray  # (vertices, 2)
     anchors: np.ndarray  # (joints, 2): world points at the poses q
+    anchors_b: np.ndarray  # (joints, 2)
+    axes: np.ndarray  # (joints, 2): directions at the poses q
+    gravity_scale: np.ndarray
+    linear_damping: np.ndarray
+    angular_damping: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    rest: np.ndarray
+    motor_speed: np.ndarray
+    motor_limit: np.ndarray
+
+
+# In a scene_t, in the order of Parameters.
+_NUMBERS = ("gravity_scale", "linear_damping", "angular_damping", "joint_lower", "joint_upper",
+            "stiffness", "joint_damping", "rest", "motor_speed", "motor_limit")
 
 
 def parameters_of(message):
@@ -137,4 +170,5 @@ def parameters_of(message):
                       np.array(message.inertia), np.array(message.friction),
                       np.array(message.restitution), np.array(message.gravity),
                       rows(message.force, 3), np.array(message.radius), rows(message.vertices, 2),
-                      rows(message.anchor, 2))
+                      rows(message.anchor, 2), rows(message.anchor_b, 2), rows(message.axis, 2),
+                      *(np.array(getattr(message, name)) for name in _NUMBERS))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from . import shapes as _shapes
-from .checks import check_body, check_joint, number, numbers
+from .checks import COLLIDING, JOINT_KEYS, check_body, check_joint, number, numbers
 from .errors import SceneError
 from .shapes import Shape
 
@@ -29,11 +29,15 @@ class Body:
     velocity: tuple[float, float] = (0.0, 0.0)  # [m/s]
     angular_velocity: float = 0.0  # [rad/s]
     mass: float | None = None  # [kg]
-    inertia: float | None = None  # about the position [kg m^2]
+    inertia: float | None = None  # about the position [kg m^2]; math.inf: no rotation
     density: float | None = None  # [kg/m^2]; mass and inertia then follow
     friction: float = 0.5
     restitution: float = 0.0
     collide: bool = True
+    gravity_scale: float = 1.0  # times the scene's gravity
+    linear_damping: float = 0.0  # d in the force -d m v [1/s]
+    angular_damping: float = 0.0  # d in the torque -d I omega [1/s]
+    sensor: bool = False  # touches nothing
     filter: dict = field(default_factory=dict)  # category, mask, group
     forces: list = field(default_factory=list)  # [torque, fx, fy] or rows [t, torque, fx, fy]
     name: str = ""
@@ -97,14 +101,33 @@ class Joint:
     body_a: int
     body_b: int
     anchor: tuple[float, float]  # world point at the initial poses [m]
-    type: str = "revolute"
+    type: str = "revolute"  # prismatic, weld, wheel, distance, rope, target, lock_x, lock_y, lock_angle
     name: str = ""
+    anchor_b: tuple[float, float] | None = None  # distance, rope: the point of body B [m]
+    axis: tuple[float, float] | None = None  # prismatic, wheel: direction of the line
+    collide: bool | None = None  # None: as is usual for the type
+    lower: float = -math.inf  # limits [rad, m]
+    upper: float = math.inf
+    restitution: float = 0.0  # at them
+    stiffness: float = 0.0  # of a spring [N/m, N m/rad]
+    damping: float = 0.0  # [N s/m, N m s/rad]
+    rest: float = 0.0  # where it gives no force [rad, m]
+    motor_speed: float = 0.0  # [rad/s, m/s]
+    motor_limit: float = 0.0  # largest torque or force [N m, N]; 0: no motor
+    break_force: float = math.inf  # breaks beyond [N]
+    break_torque: float = math.inf  # [N m]
+
+    def collides(self):
+        """Whether the two bodies may touch each other."""
+        return self.type in COLLIDING if self.collide is None else bool(self.collide)
 
 
 _BODY_KEYS = {"name", "type", "position", "angle", "velocity", "angular_velocity", "mass", "inertia",
               "density", "friction", "restitution", "collide", "filter", "forces"}
 _SCENE_KEYS = {"format", "name", "gravity", "dt", "duration", "sample", "settings", "bodies", "joints"}
-_JOINT_KEYS = {"type", "body_a", "body_b", "anchor", "name"}
+# What the engine knows of a body or joint and a scene file does not.
+_NOT_IN_FILES = {"gravity_scale", "linear_damping", "angular_damping", "sensor", "break_force",
+                 "break_torque"}
 
 
 def _check_keys(place, data, known):
@@ -150,9 +173,16 @@ class Scene:
 
     def pin(self, body_a, body_b, anchor, name=""):
         """Revolute joint at a world point; joined bodies do not collide."""
+        return self.join("revolute", body_a, body_b, anchor, name=name)
+
+    def join(self, type, body_a, body_b, anchor, **fields):
+        """Joint of any type at a world point, with fields of Joint by name: docs/joint.md."""
         place = f"joints[{len(self.joints)}]"
         joint = Joint(body_a.__index__(), body_b.__index__(), numbers(f"{place}.anchor", anchor, 2),
-                      name=name)
+                      type, **fields)
+        return self._add_joint(place, joint)
+
+    def _add_joint(self, place, joint):
         check_joint(place, joint, self.bodies)
         self.joints.append(joint)
         return joint
@@ -211,9 +241,7 @@ class Scene:
         for i, data in enumerate(source.get("bodies", ())):
             scene.add(_body_from_json(f"bodies[{i}]", data))
         for k, data in enumerate(source.get("joints", ())):
-            joint = scene._joint_from_json(f"joints[{k}]", data)
-            check_joint(f"joints[{k}]", joint, scene.bodies)
-            scene.joints.append(joint)
+            scene._add_joint(f"joints[{k}]", scene._joint_from_json(f"joints[{k}]", data))
         return scene
 
     def to_json(self):
@@ -223,22 +251,25 @@ class Scene:
         if self.settings:
             out["settings"] = dict(self.settings)
         out["bodies"] = [_body_to_json(body) for body in self.bodies]
-        out["joints"] = [_joint_to_json(joint) for joint in self.joints]
+        out["joints"] = [_joint_to_json(k, joint) for k, joint in enumerate(self.joints)]
         return out
 
     def save(self, path):
         Path(path).write_text(json.dumps(self.to_json()) + "\n", encoding="ascii")
 
     def _joint_from_json(self, place, data):
-        _check_keys(place, data, _JOINT_KEYS)
-        if data.get("type") != "revolute":
-            raise SceneError(f"{place}.type: must be revolute, is {data.get('type')!r}")
+        kind = data.get("type") if isinstance(data, dict) else None
+        if isinstance(data, dict) and kind not in JOINT_KEYS:
+            raise SceneError(f"{place}.type: must be one of {', '.join(JOINT_KEYS)}, is {kind!r}")
+        fields = JOINT_KEYS.get(kind, ())
+        _check_keys(place, data, {"type", "body_a", "body_b", "anchor", "name", "collide", *fields})
         for key in ("body_a", "body_b", "anchor"):
             if key not in data:
                 raise SceneError(f"{place}.{key}: must be given")
         a = self._find(f"{place}.body_a", data["body_a"])
         b = self._find(f"{place}.body_b", data["body_b"])
-        return Joint(a, b, numbers(f"{place}.anchor", data["anchor"], 2), name=data.get("name", ""))
+        return Joint(a, b, numbers(f"{place}.anchor", data["anchor"], 2), kind,
+                     **{key: data[key] for key in ("name", "collide", *fields) if key in data})
 
     def _find(self, place, reference):
         """Index of a body given by index or name."""
@@ -283,9 +314,19 @@ def _body_from_json(place, data):
     return Body(shapes, **{key: data[key] for key in _BODY_KEYS if key in data})
 
 
+def _only_in_engine(place, item, plain):
+    for key in sorted(_NOT_IN_FILES):
+        if getattr(item, key, None) != getattr(plain, key, None):
+            raise SceneError(f"{place}.{key}: {FORMAT} has no such key; only a server takes it")
+
+
 def _body_to_json(body):
     out = {}
     plain = Body()
+    _only_in_engine(f"bodies[{body.index}]", body, plain)
+    if body.inertia == math.inf:
+        raise SceneError(f"bodies[{body.index}].inertia: {FORMAT} has no infinite numbers; only a "
+                         "server takes it")
     for key in sorted(_BODY_KEYS):
         value = getattr(body, key)
         if value != getattr(plain, key):
@@ -297,9 +338,13 @@ def _body_to_json(body):
     return out
 
 
-def _joint_to_json(joint):
+def _joint_to_json(k, joint):
     out = {"type": joint.type, "body_a": joint.body_a, "body_b": joint.body_b,
            "anchor": list(joint.anchor)}
-    if joint.name:
-        out["name"] = joint.name
+    plain = Joint(0, 0, (0.0, 0.0))
+    _only_in_engine(f"joints[{k}]", joint, plain)
+    for key in ("name", "collide", *JOINT_KEYS[joint.type]):
+        value = getattr(joint, key)
+        if value != getattr(plain, key):
+            out[key] = list(value) if isinstance(value, tuple) else value
     return out

@@ -47,11 +47,6 @@ CAROM_API carom_client_code carom_client_connect(carom_client *client, const cha
 CAROM_API carom_client_code carom_client_attach(carom_client *client, void *lcm,
                                                 const char *daemon);
 
-typedef struct carom_client_joint {
-    int body_a, body_b;
-    carom_vec2 anchor; /* world point at the poses of the bodies [m] */
-} carom_client_joint;
-
 /* A scene: a view, all arrays are the caller's. */
 typedef struct carom_client_scene {
     const char *name; /* may be NULL */
@@ -63,7 +58,7 @@ typedef struct carom_client_scene {
     const carom_body_def *bodies;
     const char *const *body_names; /* may be NULL */
     int n_joints;
-    const carom_client_joint *joints;
+    const carom_joint_def *joints;
 } carom_client_scene;
 
 /* Sends the scene and opens a session with it, or replaces the scene of the open session.  Scenes
@@ -131,7 +126,20 @@ enum {
     CAROM_WRT_RADIUS = 512,
     CAROM_WRT_VERTICES = 1024,
     CAROM_WRT_ANCHORS = 2048,
-    CAROM_WRT_DT = 4096
+    CAROM_WRT_DT = 4096,
+    CAROM_WRT_GRAVITY_SCALE = 8192,
+    CAROM_WRT_LINEAR_DAMPING = 16384,
+    CAROM_WRT_ANGULAR_DAMPING = 32768,
+    CAROM_WRT_AXES = 65536,
+    CAROM_WRT_ANGLES = 131072,
+    CAROM_WRT_LENGTHS = 262144,
+    CAROM_WRT_LOWER = 524288,
+    CAROM_WRT_UPPER = 1048576,
+    CAROM_WRT_STIFFNESS = 2097152,
+    CAROM_WRT_DAMPING = 4194304,
+    CAROM_WRT_REST = 8388608,
+    CAROM_WRT_MOTOR_SPEED = 16777216,
+    CAROM_WRT_MOTOR_LIMIT = 33554432
 };
 
 /* Sizes and meaning as in carom_gradient; arrays that were not wanted are NULL. */
@@ -145,6 +153,9 @@ typedef struct carom_client_gradient {
     int n_bodies, n_shapes, n_vertices, n_joints;
     const double *q0, *v0, *mass, *inertia, *friction, *restitution, *gravity, *force, *force_steps;
     const double *radius, *vertices, *anchors, *dt;
+    const double *gravity_scale, *linear_damping, *angular_damping;
+    const double *axes, *angles, *lengths, *lower, *upper;
+    const double *stiffness, *damping, *rest, *motor_speed, *motor_limit;
 } carom_client_gradient;
 
 /* Gradient of sum_k <q_bar_k, q_k> + <v_bar_k, v_k> over recorded states; steps are counted as in
@@ -164,8 +175,11 @@ typedef struct carom_client_parameters {
     int n_bodies, n_shapes, n_vertices, n_joints;
     const double *q, *v, *mass, *inertia, *friction, *restitution, *gravity, *force;
     const double *radius;
-    const double *vertices; /* 2 n_vertices */
-    const double *anchors;  /* 2 n_joints: world points at the poses q */
+    const double *vertices;         /* 2 n_vertices */
+    const double *anchors;          /* 2 n_joints: world points at the poses q */
+    const double *anchors_b, *axes; /* likewise */
+    const double *gravity_scale, *linear_damping, *angular_damping;
+    const double *lower, *upper, *stiffness, *damping, *rest, *motor_speed, *motor_limit;
 } carom_client_parameters;
 CAROM_API carom_client_parameters carom_client_get_parameters(const carom_client *client);
 
