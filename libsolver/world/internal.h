@@ -364,9 +364,10 @@ double crm_slip_speed(const crm_contact *c, const double *v);
 /* change.c: when a contact of an extrapolated sub-step opens or begins to slip, it ends there. */
 carom_status crm_locate_change(carom_world *w, double left);
 
-/* stiff.c: how much of the time left a stable sub-step may take; says CAROM_LIMIT where more of
+/* stiff.c: how much of the time left a stable sub-step may take, by the forces of joints (look = 0:
+ * those of the frame so far will do); says CAROM_LIMIT where more of
  * them were needed than are allowed. */
-double crm_stiff_span(carom_world *w, double left);
+double crm_stiff_span(carom_world *w, double left, int look);
 /* locate.c: S(left), or S of a fraction of it when that has no solution, or the Euler map. */
 carom_status crm_run_through(carom_world *w, double left);
 /* A sub-step whose contacts lie ahead knows them by the features at its start, which a fast body

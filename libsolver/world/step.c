@@ -157,10 +157,10 @@ static carom_status try_substep(carom_world *w, double span, int last)
 static carom_status run_stable(carom_world *w, double left, int last, double *span)
 {
     const carom_status before = w->stats->status;
-    *span = last ? left : crm_stiff_span(w, left);
+    *span = last ? left : crm_stiff_span(w, left, 0);
     carom_status e = try_substep(w, *span, last);
     while (e >= 0 && !last) {
-        const double next = crm_stiff_span(w, left);
+        const double next = crm_stiff_span(w, left, 1);
         if (!(next < 0.75 * fmin(*span, w->sub.h))) break;
         w->stats->status = before;
         *span = next;
