@@ -31,6 +31,7 @@ typedef struct result {
     double q0[3 * N_BODIES], v0[3 * N_BODIES], mass[N_BODIES], friction[N_BODIES];
     double force_steps[3 * N_BODIES * STEPS];
     double anchors[8];
+    long replayed; /* no bit of the gradient, so last */
 } result;
 
 static void push(int step, double *force)
@@ -50,7 +51,7 @@ static void record(carom_tape *t, int from, int to)
 }
 
 /* Of the last poses and of some on the way. */
-static void differentiate(carom_tape *t, result *x)
+static carom_status try_gradient(carom_tape *t, result *x)
 {
     double q_bar[3 * N_BODIES] = {0};
     double v_bar[3 * N_BODIES] = {0};
@@ -59,6 +60,7 @@ static void differentiate(carom_tape *t, result *x)
     for (int k = 3; k < 3 * N_BODIES; k++) v_bar[k] = 0.3;
     const carom_state_bar bars[2] = {{last, q_bar, v_bar}, {last / 3, q_bar, NULL}};
     carom_gradient g = {0};
+    carom_gradient_stats stats;
     memset(x, 0, sizeof *x);
     g.q0 = x->q0;
     g.v0 = x->v0;
@@ -66,7 +68,14 @@ static void differentiate(carom_tape *t, result *x)
     g.friction = x->friction;
     g.force_steps = x->force_steps;
     g.anchors = (carom_vec2 *)x->anchors;
-    assert_int_equal(carom_tape_gradient(t, 2, bars, &g, NULL), CAROM_OK);
+    const carom_status e = carom_tape_gradient(t, 2, bars, &g, &stats);
+    x->replayed = e < 0 ? 0 : stats.replayed;
+    return e;
+}
+
+static void differentiate(carom_tape *t, result *x)
+{
+    assert_int_equal(try_gradient(t, x), CAROM_OK);
 }
 
 static void same_bits(void **state)
@@ -89,7 +98,7 @@ static void same_bits(void **state)
         record(t, 0, STEPS);
         for (int again = 0; again < 2; again++) {
             differentiate(t, &pieces);
-            assert_memory_equal(&pieces, &whole, sizeof whole);
+            assert_memory_equal(&pieces, &whole, offsetof(result, replayed));
         }
         carom_tape_destroy(t);
         carom_world_destroy(w);
@@ -116,11 +125,120 @@ static void a_gradient_on_the_way(void **state)
     assert_memory_equal(carom_world_q(w[0]), carom_world_q(w[1]), 3 * N_BODIES * sizeof(double));
     differentiate(t[0], &whole);
     differentiate(t[1], &pieces);
-    assert_memory_equal(&pieces, &whole, sizeof whole);
+    assert_memory_equal(&pieces, &whole, offsetof(result, replayed));
     for (int i = 0; i < 2; i++) {
         carom_tape_destroy(t[i]);
         carom_world_destroy(w[i]);
     }
+}
+
+/* The least bytes in which this run of so many steps has a gradient, by halving. */
+static size_t least_memory(int steps)
+{
+    static result x;
+    size_t low = 1000;
+    size_t high = 4000000;
+    while (high - low > low / 50) {
+        const size_t middle = (low + high) / 2;
+        double force[3 * N_BODIES];
+        carom_world *w = machine();
+        carom_tape *t;
+        carom_status e = CAROM_OK;
+        assert_int_equal(carom_tape_create(w, NULL, &t), CAROM_OK);
+        assert_int_equal(carom_tape_memory(t, middle), CAROM_OK);
+        for (int k = 0; k < steps && e >= 0; k++) {
+            push(k, force);
+            e = carom_tape_step(t, force, NULL);
+        }
+        if (e >= 0) e = try_gradient(t, &x);
+        assert_true(e >= 0 || e == CAROM_E_CAPACITY);
+        *(e >= 0 ? &high : &low) = middle;
+        carom_tape_destroy(t);
+        carom_world_destroy(w);
+    }
+    return high;
+}
+
+/* In all the memory that it wants no step is run twice; in less the bits are the same, the bound
+ * holds, and no step is run more often than binomial checkpoints need. */
+static void bounded(void **state)
+{
+    (void)state;
+    static const double shares[4] = {1.02, 1.5, 4, 64};
+    static result whole;
+    static result pieces;
+    const size_t least = least_memory(STEPS);
+    long most = 30 * STEPS;
+    carom_world *w = machine();
+    carom_tape *t;
+    assert_int_equal(carom_tape_create(w, NULL, &t), CAROM_OK);
+    record(t, 0, STEPS);
+    differentiate(t, &whole);
+    assert_int_equal(whole.replayed, 0);
+    carom_tape_destroy(t);
+    carom_world_destroy(w);
+    for (int i = 0; i < 4; i++) {
+        const size_t bytes = (size_t)(shares[i] * (double)least);
+        w = machine();
+        assert_int_equal(carom_tape_create(w, NULL, &t), CAROM_OK);
+        assert_int_equal(carom_tape_memory(t, bytes), CAROM_OK);
+        record(t, 0, STEPS);
+        for (int again = 0; again < 2; again++) {
+            differentiate(t, &pieces);
+            assert_memory_equal(&pieces, &whole, offsetof(result, replayed));
+            assert_in_range(carom_tape_bytes(t), 1, bytes);
+            assert_in_range(pieces.replayed, STEPS, most);
+        }
+        most = pieces.replayed;
+        carom_tape_destroy(t);
+        carom_world_destroy(w);
+    }
+    assert_in_range(most, STEPS, STEPS + 32); /* the first block measures what a step takes */
+}
+
+/* Forward through a bounded tape, and a run that goes on after a pass. */
+static void bounded_forward(void **state)
+{
+    (void)state;
+    double x[4][3 * N_BODIES];
+    double one[3 * N_BODIES] = {0};
+    carom_gradient d = {0};
+    one[3 * 1 + 1] = one[3 * 2 + 2] = 1;
+    d.v0 = one;
+    for (int i = 0; i < 2; i++) {
+        carom_world *w = machine();
+        carom_tape *t;
+        assert_int_equal(carom_tape_create(w, NULL, &t), CAROM_OK);
+        if (i) assert_int_equal(carom_tape_memory(t, 150000), CAROM_OK);
+        record(t, 0, 60);
+        const carom_state_dot half = {60, x[2 * i], NULL};
+        assert_int_equal(carom_tape_tangent(t, 1, &d, 1, &half, NULL), CAROM_OK);
+        record(t, 60, STEPS);
+        const carom_state_dot end = {STEPS, x[2 * i + 1], NULL};
+        assert_int_equal(carom_tape_tangent(t, 1, &d, 1, &end, NULL), CAROM_OK);
+        assert_true(i == 0 || carom_tape_bytes(t) <= 150000);
+        carom_tape_destroy(t);
+        carom_world_destroy(w);
+    }
+    assert_memory_equal(x[0], x[2], sizeof x[0]);
+    assert_memory_equal(x[1], x[3], sizeof x[1]);
+}
+
+/* Too little is said, with what it would take; the world is as it was. */
+static void too_little(void **state)
+{
+    (void)state;
+    carom_world *w = machine();
+    carom_tape *t;
+    assert_int_equal(carom_tape_create(w, NULL, &t), CAROM_OK);
+    assert_int_equal(carom_tape_memory(t, 3000), CAROM_OK);
+    assert_int_equal(carom_tape_step(t, NULL, NULL), CAROM_E_CAPACITY);
+    assert_non_null(strstr(carom_world_error(w), "3000 bytes"));
+    assert_int_equal(carom_world_steps(w), 0);
+    assert_int_equal(carom_tape_steps(t), 0);
+    assert_int_equal(carom_tape_memory(NULL, 1), CAROM_E_ARGUMENT);
+    carom_tape_destroy(t);
+    carom_world_destroy(w);
 }
 
 /* After a rewind the tape starts anew, with the same checkpoints. */
@@ -145,7 +263,7 @@ static void rewound(void **state)
     assert_int_equal(carom_tape_checkpoint(t, 5), CAROM_OK);
     record(t, 0, STEPS);
     differentiate(t, &second);
-    assert_memory_equal(&first, &second, sizeof first);
+    assert_memory_equal(&first, &second, offsetof(result, replayed));
     assert_int_equal(carom_tape_checkpoint(t, -1), CAROM_E_ARGUMENT);
     carom_tape_destroy(t);
     carom_world_destroy(w);
@@ -185,6 +303,39 @@ static void hundred_thousand_steps(void **state)
     carom_world_destroy(w);
 }
 
+/* The same in 6 MB: 40 bytes per step, half as much again while their list grows, and snapshots. */
+static void hundred_thousand_steps_bounded(void **state)
+{
+    (void)state;
+    const int n = 100000;
+    const size_t bytes = 6000000;
+    carom_world *w = scene_world(9.81, 1.0 / 60);
+    carom_tape *t;
+    scene_floor(w, 0, 1);
+    const int b = scene_disc(w, 1, 0.25, 0, 0.85, 0, 1);
+    assert_int_equal(carom_tape_create(w, NULL, &t), CAROM_OK);
+    assert_int_equal(carom_tape_memory(t, bytes), CAROM_OK);
+    for (int k = 0; k < n; k++) {
+        if (carom_tape_step(t, NULL, NULL) < 0) fail_msg("step %d: %s", k, carom_world_error(w));
+    }
+    assert_in_range(carom_tape_bytes(t), 1, bytes);
+    double q_bar[6] = {0};
+    double v_bar[6] = {0};
+    double q0[6];
+    q_bar[3 * b + 2] = 9.81;
+    v_bar[3 * b + 2] = carom_world_v(w)[3 * b + 2];
+    const carom_state_bar bar = {n, q_bar, v_bar};
+    carom_gradient g = {0};
+    carom_gradient_stats stats;
+    g.q0 = q0;
+    assert_int_equal(carom_tape_gradient(t, 1, &bar, &g, &stats), CAROM_OK);
+    assert_near(q0[3 * b + 2], 9.81, 1e-6 * 9.81);
+    assert_in_range(carom_tape_bytes(t), 1, bytes);
+    assert_in_range(stats.replayed, n, 3 * n); /* every step twice at most, and to the blocks */
+    carom_tape_destroy(t);
+    carom_world_destroy(w);
+}
+
 static int located(void **state)
 {
     (void)state;
@@ -199,7 +350,11 @@ int main(void)
         cmocka_unit_test_setup(same_bits, located),
         cmocka_unit_test_setup(a_gradient_on_the_way, located),
         cmocka_unit_test_setup(rewound, located),
+        cmocka_unit_test_setup(bounded, located),
+        cmocka_unit_test_setup(bounded_forward, located),
+        cmocka_unit_test_setup(too_little, located),
         cmocka_unit_test_setup(hundred_thousand_steps, located),
+        cmocka_unit_test_setup(hundred_thousand_steps_bounded, located),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

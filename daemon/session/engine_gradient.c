@@ -227,7 +227,7 @@ static carom_status reverse_pass(crm_engine *e, const carom_loss_gradient_t *los
         bars[k].v = loss->v_bar + k * width;
     }
     const carom_gradient g = gradient_view(out);
-    carom_gradient_stats stats = {0, -1, 0};
+    carom_gradient_stats stats = {0};
     const carom_status status = carom_tape_gradient(e->tape, (int)n, bars, &g, &stats);
     crm_free(&e->memory, bars, n, sizeof *bars);
     out->degenerate = stats.degenerate;

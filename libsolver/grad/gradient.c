@@ -275,9 +275,10 @@ static carom_status reverse_span(crm_reverse *r, int n_bars, const carom_state_b
     const size_t n3 = 3 * (size_t)r->world->n_bodies;
     start(r);
     for (int frame = r->to - 1; frame >= r->from; frame--) {
-        add_bars(r, frame + 1, n_bars, bars);
         carom_status e = crm_hold_segment(r->tape, frame);
-        if (e >= 0) e = reverse_frame(r, frame);
+        if (e < 0) return e;
+        add_bars(r, frame + 1, n_bars, bars);
+        e = reverse_frame(r, frame);
         if (e < 0) return e;
     }
     add_bars(r, r->from, n_bars, bars);
@@ -306,6 +307,8 @@ carom_status crm_gradient_span(carom_tape *t, int from, int to, int n_bars,
                                carom_gradient_stats *stats)
 {
     crm_reverse r = {0};
+    const long before = t->n_replayed;
+    t->ascending = 0;
     r.tape = t;
     r.world = t->world;
     r.sink.g = *gradient;
@@ -316,6 +319,7 @@ carom_status crm_gradient_span(carom_tape *t, int from, int to, int n_bars,
     carom_status e = allocate(&r);
     if (!e) e = reverse_span(&r, n_bars, bars);
     r.stats.solves += r.clockwork.stats.solves;
+    r.stats.replayed = t->n_replayed - before;
     crm_free(&t->memory, r.block, r.bytes, 1);
     crm_kinks_free(&t->memory, &r.kinks);
     if (r.clockwork.block) crm_forward_close(&r.clockwork);

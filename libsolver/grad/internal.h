@@ -20,14 +20,17 @@ typedef struct crm_record {
 /* One recorded step. */
 typedef struct crm_frame {
     int first_record; /* of this step */
+    int lean;         /* 1: its force is its own or rest_force, and its states come and go */
     double *force;    /* 3 n_bodies */
     double *q, *v;    /* 3 n_bodies: state before this step */
 } crm_frame;
 
-/* A world as bytes. */
+/* A world as bytes, before the frame `step`. */
 typedef struct crm_snapshot {
     void *bytes;
-    size_t size, capacity;
+    size_t size;
+    int step;
+    int for_good; /* 0: taken by a pass, to be dropped by it */
 } crm_snapshot;
 
 struct carom_tape {
@@ -39,16 +42,23 @@ struct carom_tape {
     int n_frames, max_frames;
     crm_frame *frames;
     double *q_end, *v_end; /* 3 n_bodies: state after the last recorded step */
+    double *rest_force;    /* 3 n_bodies: of steps that were given none, where memory is bounded */
     int n_bodies;
     int most_contacts;   /* of all sub-steps recorded */
     int frame;           /* under way */
     carom_world *source; /* of the sub-steps under way: world, or replay */
-    /* Checkpoints: only one segment of `every` frames has records; the others are run again. */
-    int every; /* 0: all frames are one segment */
-    int held;  /* the segment that has them, from its start; -1: none */
-    int max_snapshots;
-    crm_snapshot *snapshots; /* per segment: of the world before it */
-    carom_world *replay;     /* during a gradient: a copy of the world that runs again */
+    /* Checkpoints: only the frames held_from .. held_to - 1 have records; others are run again. */
+    int held_from, held_to; /* -1: none */
+    double *block_end;      /* 6 n_bodies: state after the held ones, where states are not kept */
+    int every;              /* distance of snapshots; 0: none, all frames are held */
+    size_t limit;      /* of the memory of the tape; 0: none, and states of all steps are kept */
+    size_t step_bytes; /* most that a step run again has taken */
+    int ascending;     /* 1: a pass goes forward */
+    int n_snapshots, max_snapshots;
+    crm_snapshot *snapshots;
+    carom_world *replay; /* a copy of the world that runs again */
+    int replay_at;       /* the step it has come to; -1: not known */
+    long n_replayed;     /* steps run again so far */
 };
 
 /* tape.c */
@@ -56,13 +66,23 @@ struct carom_tape {
 carom_status crm_record_step(carom_tape *t, int frame, const double *force,
                              carom_step_stats *stats);
 void crm_drop_records(carom_tape *t, int n);
+/* The state of a world as that before a frame, which has none; and dropped again. */
+carom_status crm_keep_states(carom_tape *t, int frame, const carom_world *w);
+void crm_drop_states(carom_tape *t, int frame);
+/* CAROM_E_STATE where a world is not in the state before a frame, to the bit: the derivative would
+ * be that of another run. */
+carom_status crm_same_states(const carom_tape *t, int frame, const carom_world *w);
+/* The state of a world as that after the held frames. */
+void crm_keep_block_end(carom_tape *t, const carom_world *w);
 
 /* checkpoint.c */
-int crm_segment(const carom_tape *t, int frame);
-/* Before frame is run: a snapshot when a segment begins. */
+/* Before frame is run: a snapshot when it is time for one. */
 carom_status crm_checkpoint(carom_tape *t, int frame);
-/* The records of the segment of frame, run again when they are gone. */
+/* Whether sub-steps are recorded as the run goes. */
+int crm_records_kept(const carom_tape *t);
+/* The records of a frame, run again when they are gone. */
 carom_status crm_hold_segment(carom_tape *t, int frame);
+void crm_forget_checkpoints(carom_tape *t);
 void crm_free_checkpoints(carom_tape *t);
 
 /* shared.c: the arrays of a gradient one by one: where array k is, NULL when not wanted, and how

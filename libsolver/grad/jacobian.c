@@ -120,6 +120,7 @@ carom_status carom_tape_jacobian(carom_tape *tape, int step, const carom_gradien
                               tape->n_frames);
     }
     carom_status e = crm_tape_current(tape);
+    tape->ascending = 0;
     if (e >= 0) e = crm_hold_segment(tape, step);
     jacobian j = {tape, rows, step, 6 * (size_t)tape->n_bodies, 0, 0, {0}};
     j.stats.first_degenerate_step = -1;

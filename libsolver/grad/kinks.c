@@ -223,6 +223,7 @@ carom_status carom_tape_kinks(carom_tape *tape, int capacity, carom_kink *kinks,
     walk x = {tape, tape->world, {0}, {0, 0, NULL}};
     carom_status e = crm_tape_current(tape);
     if (e) return e;
+    tape->ascending = 1;
     e = crm_forward_open(&x.f, tape, 0, NULL, 0);
     for (int frame = 0; e >= 0 && frame < tape->n_frames; frame++) e = walk_frame(&x, frame);
     crm_forward_close(&x.f);

@@ -77,8 +77,7 @@ double crm_grazing(const carom_world *w, const crm_substep *s)
 
 int crm_frame_end(const carom_tape *t, int frame)
 {
-    const int more = frame + 1 < t->n_frames && crm_segment(t, frame + 1) == t->held;
-    return more ? t->frames[frame + 1].first_record : t->n_records;
+    return frame + 1 < t->held_to ? t->frames[frame + 1].first_record : t->n_records;
 }
 
 double crm_border_acceleration(const carom_tape *t, int step, int k)

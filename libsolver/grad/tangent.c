@@ -250,7 +250,7 @@ carom_status crm_forward_open(crm_forward *f, carom_tape *tape, int n,
                               const carom_gradient *directions, int step)
 {
     const size_t n3 = 3 * (size_t)tape->n_bodies;
-    const double *q = carom_tape_q(tape, step);
+    const double *q = tape->q_end; /* of which only the static bodies count */
     memset(f, 0, sizeof *f);
     f->tape = tape;
     f->world = tape->world;
@@ -292,6 +292,10 @@ carom_status carom_tape_tangent(carom_tape *tape, int n_directions,
     carom_status e = check(tape, n_directions, n_dots, dots);
     if (e) return e;
     crm_forward f;
+    const long before = tape->n_replayed;
+    tape->ascending = 1;
+    if (tape->n_frames > 0) e = crm_hold_segment(tape, 0);
+    if (e < 0) return crm_world_fail(tape->world, e, "tangent: %s", carom_status_text(e));
     e = crm_forward_open(&f, tape, n_directions, directions, 0);
     if (e >= 0) give_states(&f, 0, n_dots, dots);
     for (int frame = 0; e >= 0 && frame < tape->n_frames; frame++) {
@@ -300,6 +304,7 @@ carom_status carom_tape_tangent(carom_tape *tape, int n_directions,
         if (e >= 0) e = crm_forward_frame(&f, frame);
         if (e >= 0) give_states(&f, frame + 1, n_dots, dots);
     }
+    f.stats.replayed = tape->n_replayed - before;
     crm_forward_close(&f);
     if (e < 0) return crm_world_fail(tape->world, e, "tangent: %s", carom_status_text(e));
     if (stats) *stats = f.stats;

@@ -71,6 +71,8 @@ static carom_status record_substep(void *user, const crm_substep *s)
 {
     carom_tape *t = user;
     const crm_island *island = t->source->island;
+    if (s->n_contacts > t->most_contacts) t->most_contacts = s->n_contacts;
+    if (t->source == t->world && !crm_records_kept(t)) return CAROM_OK;
     void *records = t->records;
     carom_status e =
         crm_reserve(&t->memory, &records, &t->max_records, t->n_records + 1, sizeof *t->records);
@@ -88,7 +90,6 @@ static carom_status record_substep(void *user, const crm_substep *s)
     r->s.force = t->frames[t->frame].force;
     r->which = (int)(island - t->source->islands.list);
     r->inner = s != &t->source->sub;
-    if (s->n_contacts > t->most_contacts) t->most_contacts = s->n_contacts;
     t->n_records++;
     return CAROM_OK;
 }
@@ -113,6 +114,20 @@ static void keep_end(carom_tape *t)
 {
     memcpy(t->q_end, t->world->q, n3(t) * sizeof(double));
     memcpy(t->v_end, t->world->v, n3(t) * sizeof(double));
+}
+
+/* All arrays of a frame. */
+static void drop_frame(carom_tape *t, int frame)
+{
+    crm_frame *f = &t->frames[frame];
+    const crm_frame none = {0};
+    if (f->lean) {
+        crm_drop_states(t, frame);
+        if (f->force != t->rest_force) crm_free(&t->memory, f->force, n3(t), sizeof(double));
+    } else {
+        crm_free(&t->memory, f->force, 3 * n3(t), sizeof(double));
+    }
+    *f = none;
 }
 
 carom_status carom_tape_create(carom_world *world, const carom_allocator *allocator,
@@ -145,9 +160,9 @@ void carom_tape_destroy(carom_tape *tape)
 {
     if (!tape) return;
     crm_drop_records(tape, 0);
-    for (int k = 0; k < tape->max_frames; k++) {
-        crm_free(&tape->memory, tape->frames[k].force, 3 * n3(tape), sizeof(double));
-    }
+    for (int k = 0; k < tape->max_frames; k++) drop_frame(tape, k);
+    crm_free(&tape->memory, tape->rest_force, n3(tape), sizeof(double));
+    crm_free(&tape->memory, tape->block_end, 2 * n3(tape), sizeof(double));
     crm_free(&tape->memory, tape->records, (size_t)tape->max_records, sizeof *tape->records);
     crm_free(&tape->memory, tape->frames, (size_t)tape->max_frames, sizeof *tape->frames);
     crm_free(&tape->memory, tape->q_end, n3(tape), sizeof(double));
@@ -159,24 +174,18 @@ void carom_tape_destroy(carom_tape *tape)
 
 void carom_tape_rewind(carom_tape *tape)
 {
-    crm_drop_records(tape, 0);
+    crm_forget_checkpoints(tape);
+    for (int k = 0; tape->limit && k < tape->n_frames; k++) drop_frame(tape, k);
     tape->n_frames = 0;
-    tape->held = -1;
     tape->revision = tape->world->revision;
     crm_forget_clocks(tape->world);
     keep_end(tape);
 }
 
-/* The frame of the coming step; its arrays, one block, are kept for reuse after a rewind. */
-static carom_status open_frame(carom_tape *t, const double *force)
+/* A frame with its force and states in one block, kept for reuse after a rewind. */
+static carom_status fill_frame(carom_tape *t, crm_frame *f, const double *force)
 {
     const carom_world *w = t->world;
-    void *frames = t->frames;
-    const carom_status e =
-        crm_reserve(&t->memory, &frames, &t->max_frames, t->n_frames + 1, sizeof *t->frames);
-    t->frames = frames;
-    if (e) return e;
-    crm_frame *f = &t->frames[t->n_frames];
     if (!f->force) f->force = crm_new(&t->memory, 3 * n3(t), sizeof(double));
     if (!f->force) return CAROM_E_MEMORY;
     f->q = f->force + n3(t);
@@ -185,6 +194,64 @@ static carom_status open_frame(carom_tape *t, const double *force)
     memcpy(f->v, w->v, n3(t) * sizeof(double));
     for (size_t k = 0; k < n3(t); k++) f->force[k] = w->force[k] + (force ? force[k] : 0);
     return CAROM_OK;
+}
+
+/* Where memory is bounded: a force only if one is given, no states. */
+static carom_status fill_lean_frame(carom_tape *t, crm_frame *f, const double *force)
+{
+    const size_t n = n3(t);
+    if (!t->rest_force) t->rest_force = crm_new(&t->memory, n, sizeof(double));
+    if (!t->block_end) t->block_end = crm_new(&t->memory, 2 * n, sizeof(double));
+    if (!t->rest_force || !t->block_end) return CAROM_E_MEMORY;
+    memcpy(t->rest_force, t->world->force, n * sizeof(double));
+    f->force = force ? crm_new(&t->memory, n, sizeof(double)) : t->rest_force;
+    if (!f->force) return CAROM_E_MEMORY;
+    for (size_t k = 0; force && k < n; k++) f->force[k] = t->world->force[k] + force[k];
+    return CAROM_OK;
+}
+
+/* The frame of the coming step. */
+static carom_status open_frame(carom_tape *t, const double *force)
+{
+    void *frames = t->frames;
+    const carom_status e =
+        crm_reserve(&t->memory, &frames, &t->max_frames, t->n_frames + 1, sizeof *t->frames);
+    t->frames = frames;
+    if (e) return e;
+    crm_frame *f = &t->frames[t->n_frames];
+    if (f->force && (f->lean || t->limit)) drop_frame(t, t->n_frames);
+    f->lean = t->limit > 0;
+    return f->lean ? fill_lean_frame(t, f, force) : fill_frame(t, f, force);
+}
+
+carom_status crm_keep_states(carom_tape *t, int frame, const carom_world *w)
+{
+    crm_frame *f = &t->frames[frame];
+    if (!f->q) f->q = crm_new(&t->memory, 2 * n3(t), sizeof(double));
+    if (!f->q) return CAROM_E_MEMORY;
+    f->v = f->q + n3(t);
+    memcpy(f->q, w->q, n3(t) * sizeof(double));
+    memcpy(f->v, w->v, n3(t) * sizeof(double));
+    return CAROM_OK;
+}
+
+void crm_drop_states(carom_tape *t, int frame)
+{
+    crm_frame *f = &t->frames[frame];
+    crm_free(&t->memory, f->q, 2 * n3(t), sizeof(double));
+    f->q = f->v = NULL;
+}
+
+carom_status crm_same_states(const carom_tape *t, int frame, const carom_world *w)
+{
+    return memcmp(w->q, t->frames[frame].q, n3(t) * sizeof(double)) ? CAROM_E_STATE : CAROM_OK;
+}
+
+void crm_keep_block_end(carom_tape *t, const carom_world *w)
+{
+    if (!t->limit) return;
+    memcpy(t->block_end, w->q, n3(t) * sizeof(double));
+    memcpy(t->block_end + n3(t), w->v, n3(t) * sizeof(double));
 }
 
 static int continues(const carom_tape *t)
@@ -217,10 +284,12 @@ carom_status carom_tape_step(carom_tape *tape, const double *force, carom_step_s
     }
     carom_status e = open_frame(tape, force);
     if (!e) e = crm_checkpoint(tape, tape->n_frames);
+    if (e == CAROM_E_CAPACITY) return e;
     if (e) return crm_world_fail(w, e, "no memory to record step %ld", w->n_steps + 1);
     e = crm_record_step(tape, tape->n_frames, force, stats);
     if (e < 0) return e;
     tape->n_frames++;
+    if (crm_records_kept(tape)) tape->held_to = tape->n_frames;
     keep_end(tape);
     return e;
 }
@@ -239,6 +308,7 @@ const double *carom_tape_q(const carom_tape *tape, int step)
 {
     if (!tape || step < 0 || step > tape->n_frames) return NULL;
     if (step == tape->n_frames) return tape->q_end;
+    if (tape->limit && step == tape->held_to) return tape->block_end;
     return tape->frames[step].q;
 }
 
@@ -246,5 +316,6 @@ const double *carom_tape_v(const carom_tape *tape, int step)
 {
     if (!tape || step < 0 || step > tape->n_frames) return NULL;
     if (step == tape->n_frames) return tape->v_end;
+    if (tape->limit && step == tape->held_to) return tape->block_end + n3(tape);
     return tape->frames[step].v;
 }

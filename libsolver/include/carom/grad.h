@@ -23,12 +23,19 @@ CAROM_API carom_status carom_tape_step(carom_tape *tape, const double *force,
  * world, and gets the same bits.  Memory is least near every = sqrt(steps).  0: keeps all, as a new
  * tape does.  Before the first step of a recording, else CAROM_E_STATE. */
 CAROM_API carom_status carom_tape_checkpoint(carom_tape *tape, int every);
+/* The same with a bound on what the tape holds, carom_tape_bytes, in place of `every`; 0: none.  It
+ * keeps snapshots as far apart as they must be, the forces that steps are given and 40 bytes per
+ * step; no sub-steps, and no states but the last.  A pass over the tape runs the steps again, from
+ * snapshots that it sets by binomial checkpointing (Griewank and Walther's revolve) in the memory
+ * that is left.  A step, or a pass with its workspace, that the bound is too small for:
+ * CAROM_E_CAPACITY. */
+CAROM_API carom_status carom_tape_memory(carom_tape *tape, size_t bytes);
 /* Forgets all steps; the next recording starts at the world's present state. */
 CAROM_API void carom_tape_rewind(carom_tape *tape);
 CAROM_API int carom_tape_steps(const carom_tape *tape);
 CAROM_API size_t carom_tape_bytes(const carom_tape *tape);
 /* Recorded state after `step` steps, 0 <= step <= carom_tape_steps: 3 n_bodies, owned by the tape.
- */
+ * NULL where memory is bounded and the state is not held: only the last one always is. */
 CAROM_API const double *carom_tape_q(const carom_tape *tape, int step);
 CAROM_API const double *carom_tape_v(const carom_tape *tape, int step);
 
@@ -98,6 +105,7 @@ typedef struct carom_gradient_stats {
                                 * borders where a state was asked for */
     int first_degenerate_step; /* -1: none */
     long solves;               /* contact problems differentiated, per direction */
+    long replayed;             /* steps run again, from checkpoints */
 } carom_gradient_stats;
 
 /* Reverse pass over the whole tape: gradient of  sum_k <q_bar_k, q_k> + <v_bar_k, v_k>.
