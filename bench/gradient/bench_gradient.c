@@ -7,7 +7,7 @@
  *
  * WHAT: 0 steps alone, 1 recorded, 2 backward by q0, 3 backward by all, 4 backward by all with
  * checkpoints, so that all but a tenth of the steps are run again. */
-#include "bench/contact/clock.h"
+#include "bench/solver/clock.h"
 #include "own.h"
 #include "problems.h"
 

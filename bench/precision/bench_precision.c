@@ -8,7 +8,7 @@
  * the end, an angle times its size.  References are closed forms, or order 8 at 480 steps per
  * second, if 960 agree to 1e-10; their agreement is printed as a comment.  --quick: fewer rates and
  * rounds. */
-#include "bench/contact/clock.h"
+#include "bench/solver/clock.h"
 #include "bench/step/own.h"
 #include "problems.h"
 

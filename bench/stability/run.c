@@ -1,7 +1,7 @@
 /* run.c: runs a cell and judges it. */
 #include "trial.h"
 
-#include "bench/contact/clock.h"
+#include "bench/solver/clock.h"
 #include "bench/step/own.h"
 
 #include "carom/grad.h"

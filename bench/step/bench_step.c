@@ -5,7 +5,7 @@
  * Each figure is the least over rounds of the mean over the scene's steps.  Beside it stand the
  * largest overlap at the end and how far bodies moved that should rest, measured from the poses
  * with carom_collide for all alike.  A failed step ends in exit code 1. */
-#include "bench/contact/clock.h"
+#include "bench/solver/clock.h"
 #include "scene.h"
 
 #include "carom/broadphase.h"

@@ -16,7 +16,7 @@
 #define GROWTH 2
 /* The crossover is tried from points below this residual [1]. */
 #define NEAR 0.1
-enum { EVERY = 3, PIVOTS = 1000, FIRST_SWEEPS = 20, SWEEPS = 50 };
+enum { EVERY = 5, PIVOTS = 1000, FIRST_SWEEPS = 20, SWEEPS = 50 };
 
 /* Levenberg's damping, contact by contact.  At the center (w, l)^ with modes from the natural map
  * and compliances d, the step solves

@@ -9,7 +9,7 @@
 #define HAND_OVER 1e-8
 /* The crossover is tried when the residual is below this, and again each time that it has fallen by
  * CROSS_AGAIN [1]. */
-#define CROSS       1e-3
+#define CROSS       1e-2
 #define CROSS_AGAIN 1e-2
 /* Smallest centering [1]. */
 #define SIGMA_MIN 1e-8
@@ -17,8 +17,7 @@
 #define NEIGHBORHOOD 1e-4
 /* Iterations without progress before giving up. */
 #define PATIENCE 8
-/* Contacts from which on an island crosses over, and pivots of one attempt. */
-enum { MANY = 16, PIVOTS = 300 };
+enum { PIVOTS = 300 }; /* of one crossover */
 
 /* A direction: the vector of the full system and its slacks. */
 typedef struct direction {
@@ -418,7 +417,7 @@ static int iterate(interior *p)
     crm_island *s = p->s;
     progress history = {.n = 0};
     double best = HUGE_VAL;
-    double near = s->nc < MANY ? 0 : CROSS;
+    double near = s->nc < CRM_MANY ? 0 : CROSS;
     int short_steps = 0;
     crm_vec_copy(s, s->top, s->x);
     for (int i = 0; i < s->max_iterations; i++) {

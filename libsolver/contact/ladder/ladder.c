@@ -13,7 +13,6 @@ enum {
     ROUNDS_POLISH = 8,  /* after the interior point */
     ROUNDS_REPAIR = 15, /* after sweeps and Lemke */
     DAMPED_STEPS = 150,
-    MANY = 16,      /* contacts of an island whose guess is followed further */
     N_SWEEPS = 300, /* first bout; each further one is twice as long */
     N_BOUTS = 5,
     LEMKE_CONTACTS = 300, /* most contacts for Lemke's method ... */
@@ -162,11 +161,13 @@ static int try_guess_modes(climb *c, int use_guess)
     return guess_is_accepted(s);
 }
 
-/* The polish also follows an accepted point: it makes complementarity exact. */
+/* The polish also follows an accepted point: it makes complementarity exact.  Large islands have
+ * crossed over. */
 static int try_interior(climb *c, carom_contact_stage stage, crm_interior_start start)
 {
     const int done = crm_interior_point(c->s, start);
-    return polish(c, stage, done ? 1 : ROUNDS_POLISH) || done;
+    const int rounds = done || c->s->nc >= CRM_MANY ? 1 : ROUNDS_POLISH;
+    return polish(c, stage, rounds) || done;
 }
 
 static int try_damped(climb *c)
@@ -185,7 +186,7 @@ static int try_guess(climb *c, int use_guess)
     *c->stage = CAROM_STAGE_GUESS;
     if (use_guess == CAROM_GUESS_IMPULSES && guess_is_exact(s)) return 1;
     if (try_guess_modes(c, use_guess)) return 1;
-    if (s->nc < MANY || !(s->best_residual < HUGE_VAL)) return 0;
+    if (s->nc < CRM_MANY || !(s->best_residual < HUGE_VAL)) return 0;
     crm_vec_copy(s, s->x, s->best);
     return try_interior(c, CAROM_STAGE_INTERIOR_POINT, near) || try_damped(c);
 }
@@ -285,7 +286,7 @@ carom_status crm_ladder_climb(crm_island *s, int use_guess, carom_contact_stage 
     if (is_free(s)) return CAROM_OK;
     const int guessed = use_guess && (s->nc || use_guess == CAROM_GUESS_IMPULSES);
     if (guessed && try_guess(&c, use_guess)) return CAROM_OK;
-    if (!(guessed && s->nc >= MANY) && try_active_sets(&c)) return CAROM_OK;
+    if (!(guessed && s->nc >= CRM_MANY) && try_active_sets(&c)) return CAROM_OK;
     if (s->nc) {
         c.large = estimate_multiplier(s);
         const crm_interior_start start = {.ln = c.large, .slack = 1, .fraction = 0.995};

@@ -5,6 +5,10 @@
 
 #include "libsolver/contact/island.h"
 
+/* Contacts from which on an island is large: its guess is followed further, and the interior point
+ * crosses over. */
+enum { CRM_MANY = 16 };
+
 /* Rounds of {solve at the modes, natural map}, from s->mode and s->x. */
 int crm_active_set(crm_island *s, int rounds);
 /* Solves the equations of s->mode, starting from s->x, in `passes` proximal passes at most. */

@@ -4,7 +4,7 @@
 
 /* Passes of refinement stop when the defect, relative to the solution, is below this [1]. */
 #define DEFECT_DONE 1e-12
-/* A slope that counts as zero [1]. */
+/* A slope that counts as zero, of the largest d [1]. */
 #define SLOPE_ZERO 1e-14
 /* A pivot of the small system below this share of its column counts as zero [1]. */
 #define PIVOT_ZERO 1e-14
@@ -44,6 +44,7 @@ typedef struct work {
     double y[MAX_SLOTS]; /* 0: the row has its base equation again */
     int n_slots;
     double direction;
+    double flat; /* slopes up to this are zero */
 } work;
 
 static double row_n(const crm_island *s, int k, const double *z)
@@ -416,7 +417,7 @@ static double find_event(const work *w, int *contact, int *condition)
         conditions(s, k, w->ln, w->lt, w->an, w->ut, g);
         for (int i = 0; i < n; i++) {
             const double slope = w->direction * g[i];
-            if (!(slope < -SLOPE_ZERO)) continue;
+            if (!(slope < -w->flat)) continue;
             const double t = fmax(f[i], 0) / -slope;
             if (t >= step) continue;
             step = t;
@@ -445,7 +446,7 @@ static int turn(work *w, int k, int now)
 {
     double g[2];
     conditions(w->p->s, k, w->ln, w->lt, w->an, w->ut, g);
-    if (!(fabs(g[now]) > SLOPE_ZERO)) return 0;
+    if (!(fabs(g[now]) > w->flat)) return 0;
     w->direction = g[now] > 0 ? 1 : -1;
     return 1;
 }
@@ -462,6 +463,9 @@ static void begin(work *w, crm_path *p)
     w->an = s->slack[CRM_N_SLACKS - 2];
     w->ut = s->slack[CRM_N_SLACKS - 1];
     w->direction = -1;
+    w->flat = 0;
+    for (int k = 0; k < s->nc; k++)
+        w->flat = fmax(w->flat, SLOPE_ZERO * fmax(fabs(p->d.n[k]), fabs(p->d.t[k])));
     refresh(w);
 }
 

@@ -1,6 +1,6 @@
 /* scenes.h: contact problems of the bench: stacks, pyramids, piles of discs, chains. */
-#ifndef BENCH_CONTACT_SCENES_H
-#define BENCH_CONTACT_SCENES_H
+#ifndef BENCH_SOLVER_SCENES_H
+#define BENCH_SOLVER_SCENES_H
 
 #include "contact_case.h"
 

@@ -1,6 +1,6 @@
 /* clock.h: least CPU time of a repeated call. */
-#ifndef BENCH_CONTACT_CLOCK_H
-#define BENCH_CONTACT_CLOCK_H
+#ifndef BENCH_SOLVER_CLOCK_H
+#define BENCH_SOLVER_CLOCK_H
 
 #include <time.h>
 
