@@ -5,7 +5,7 @@
  *
  * Usage: bench_leave_out [--quick]    CSV to standard output, progress to standard error.
  *        bench_leave_out CASE KEPT STEPS    runs one form: what callgrind looks at. */
-#include "bench/contact/clock.h"
+#include "bench/solver/clock.h"
 #include "profile.h"
 #include "scenes.h"
 
