@@ -39,10 +39,11 @@ void crm_island_defect(const crm_island *s, crm_vec x, double *z)
     for (int q = 0; q < s->ng; q++) {
         const crm_group *g = &s->group[q];
         const int at = 3 * (s->nb + q);
-        for (int r = 0; r < CRM_GROUP_ROWS; r++) {
+        for (int r = 0; r < g->n; r++) {
             crm_add(z, g->j[r], g->a, g->b, x.z[at + r]);
             z[at + r] = -(crm_dot(g->j[r], g->a, g->b, x.z) + g->c[r]);
         }
+        for (int r = g->n; r < CRM_GROUP_ROWS; r++) z[at + r] = 0;
     }
 }
 
@@ -67,7 +68,7 @@ void crm_island_term_sizes(const crm_island *s, crm_vec x, double *size)
     }
     for (int q = 0; q < s->ng; q++) {
         const crm_group *g = &s->group[q];
-        for (int r = 0; r < CRM_GROUP_ROWS; r++)
+        for (int r = 0; r < g->n; r++)
             add_size(size, g->j[r], g->a, g->b, x.z[3 * (s->nb + q) + r]);
     }
 }

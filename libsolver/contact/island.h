@@ -34,6 +34,7 @@ typedef struct crm_group {
     double j[CRM_GROUP_ROWS][6];
     double c[CRM_GROUP_ROWS];
     double residual[CRM_GROUP_ROWS];
+    int n; /* rows, without missing ones */
     int a;
     int b;
 } crm_group;

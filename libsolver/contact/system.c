@@ -137,6 +137,7 @@ static void gather_group(crm_system *y, const crm_graph *g, const carom_contact_
     memset(q, 0, sizeof *q);
     q->a = g->group_node[2 * slot];
     q->b = g->group_node[2 * slot + 1];
+    q->n = g->group_size[slot];
     for (int i = 0; i < CRM_GROUP_ROWS; i++) {
         const int r = g->group_row[slot] + i;
         double *scale = &y->scale_e[3 * slot + i];

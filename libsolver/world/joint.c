@@ -90,7 +90,9 @@ static void direction_row(crm_measure m, const crm_joint_frame *f, carom_vec2 u,
     row[5] = u.y;
 }
 
-double crm_measure_at(const crm_joint *j, crm_measure m, const double *q, double row[6])
+/* The frame f at q is not read by a turn. */
+static double measure_in(const crm_joint *j, crm_measure m, const double *q,
+                         const crm_joint_frame *f, double row[6])
 {
     if (m == CRM_TURN) {
         const double l = j->lever;
@@ -98,17 +100,23 @@ double crm_measure_at(const crm_joint *j, crm_measure m, const double *q, double
         memcpy(row, turn, sizeof turn);
         return l * ((q[3 * j->body_b] - q[3 * j->body_a]) - j->angle);
     }
+    const carom_vec2 u = crm_measure_direction(j, m, q, f);
+    direction_row(m, f, u, row);
+    if (m == CRM_APART) return hypot(f->d.x, f->d.y) - j->length;
+    return u.x * f->d.x + u.y * f->d.y;
+}
+
+double crm_measure_at(const crm_joint *j, crm_measure m, const double *q, double row[6])
+{
     const crm_joint_frame f = crm_joint_frame_at(j, q);
-    const carom_vec2 u = crm_measure_direction(j, m, q, &f);
-    direction_row(m, &f, u, row);
-    if (m == CRM_APART) return hypot(f.d.x, f.d.y) - j->length;
-    return u.x * f.d.x + u.y * f.d.y;
+    return measure_in(j, m, q, &f, row);
 }
 
 void crm_joint_rows(const crm_joint *j, const double *q, double *je, double *error)
 {
+    const crm_joint_frame f = crm_joint_frame_at(j, q);
     for (int k = 0; k < j->n_held; k++) {
-        error[k] = crm_measure_at(j, HELD[j->kind].measure[k], q, &je[6 * k]);
+        error[k] = measure_in(j, HELD[j->kind].measure[k], q, &f, &je[6 * k]);
     }
     if (j->n_rows == j->n_held) return;
     memset(&je[6 * j->n_held], 0, 6 * sizeof *je);
