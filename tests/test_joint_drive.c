@@ -223,6 +223,35 @@ static void stalled_motor(void **state)
     }
 }
 
+/* An arm that a strong motor drives against its stop stays there, whatever its speed rounds to. */
+static void stop_stands(void **state)
+{
+    (void)state;
+    static const double rates[] = {10, 60, 100, 240};
+    static const double torques[] = {10, 1e3, 1e5};
+    for (int k = 0; k < 36; k++) {
+        scene_integrator = INTEGRATORS[k % 3];
+        carom_world *w = scene_world(9.81, 1 / rates[k / 3 % 4]);
+        const int base = scene_anchor(w);
+        const carom_pose level = {0, 0.5, 0};
+        const int arm = scene_box(w, 0.1, 0.5, 0.05, level, 0, 0);
+        carom_joint_def d = of(CAROM_REVOLUTE, base, arm);
+        d.lower = -0.5;
+        d.upper = 0.5;
+        d.motor_speed = 3;
+        d.motor_limit = torques[k / 12] * 0.1 * 9.81 * 0.5;
+        join(w, &d);
+        for (int n = 1; n <= 2 * (int)rates[k / 3 % 4]; n++) {
+            scene_run(w, 1, NULL);
+            /* the way to the stop at 3 rad/s, then it stays: a step that locates nothing is late */
+            const double way = fmin(0.5, 3 * n / rates[k / 3 % 4]);
+            assert_near_case("angle", k, q_of(w, arm)[0], way, 0.1);
+        }
+        assert_near_case("at the stop", k, q_of(w, arm)[0], 0.5, 1e-9);
+        carom_world_destroy(w);
+    }
+}
+
 /* A car on two wheels that drive: it rolls at motor speed times radius, on springs. */
 static void car(void **state)
 {
@@ -320,6 +349,7 @@ int main(void)
         cmocka_unit_test(motor_spins_up),
         cmocka_unit_test(lift),
         cmocka_unit_test(stalled_motor),
+        cmocka_unit_test(stop_stands),
         cmocka_unit_test(car),
         cmocka_unit_test(forces_at_rest),
         cmocka_unit_test(refusals),

@@ -208,7 +208,10 @@ int crm_motors_stall(const carom_world *w, const crm_substep *s, crm_solve *c)
         if (j->n_rows == j->n_held || c->motor[row] != CRM_MOTOR_HOLDS) continue;
         double je[6];
         crm_measure_at(j, crm_motor_measure(j->kind), c->q, je);
-        const double lacks = crm_motor_speed(j) - crm_row_dot(je, s->v0, j->body_a, j->body_b);
+        const double speed = crm_motor_speed(j);
+        double lacks = speed - crm_row_dot(je, s->v0, j->body_a, j->body_b);
+        /* at its speed to rounding: what stands in its way makes it slower */
+        if (fabs(lacks) <= CRM_REST_TOL * fabs(speed)) lacks = speed;
         c->motor[row] = lacks < 0 ? CRM_MOTOR_MINUS : CRM_MOTOR_PLUS;
         c->ce[row] = 0;
         changes++;
