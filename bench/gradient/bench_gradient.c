@@ -18,8 +18,8 @@
 
 enum { FORWARD, RECORD, BACKWARD, BACKWARD_ALL, BACKWARD_AGAIN, N_WHATS };
 static const char *const WHATS[N_WHATS] = {"forward", "recorded", "backward by q0",
-                                           "backward by all", "backward by all, checkpoints"};
-enum { N_STEPS = 60, N_OWN = 4 };
+                                           "backward by all", "backward by all with checkpoints"};
+enum { N_WARM_UP = 60, N_STEPS = 60, N_OWN = 4 };
 /* Relative error of a derivative that has a closed form, at most. */
 static const double EXACT = 1e-10;
 /* Rounds of each, the least time counts; a scene has no more of them after this [s]. */
@@ -27,7 +27,7 @@ enum { N_ROUNDS = 9 };
 static const double BUDGET = 6;
 static const int SCENES[N_OWN] = {5, 4, 6, -1}; /* of bench/step; -1: a pile of this file */
 static const char *const NAMES[N_OWN] = {"stack of 10", "chain of 10", "pyramid of 210",
-                                         "pile of 100"};
+                                         "pile of 40"};
 
 static void must(const char *what, carom_status e)
 {
@@ -69,13 +69,13 @@ static carom_world *build(int which, carom_integrator integrator)
 {
     carom_world *w;
     if (SCENES[which] < 0) {
-        w = pile(100, integrator);
+        w = pile(40, integrator);
     } else {
         scene s = make_scene(SCENES[which]);
         w = own_create(&s, integrator, 2);
         free_scene(&s);
     }
-    for (int k = 0; k < 20; k++) must("warm up", carom_world_step(w, NULL, NULL));
+    for (int k = 0; k < N_WARM_UP; k++) must("warm up", carom_world_step(w, NULL, NULL));
     return w;
 }
 
