@@ -4,6 +4,8 @@
 #include "direct.h"
 #include "requests.h"
 
+#include <stddef.h>
+
 static void gradient_is_that_of_the_library(void **state)
 {
     enum { STEPS = 60, COORD = 4, N = 4 };
@@ -56,6 +58,120 @@ static void gradient_is_that_of_the_library(void **state)
     carom_parameter_gradient_t_destroy(m);
     carom_tape_destroy(tape);
     carom_world_destroy(w);
+    bench_destroy(b);
+}
+
+/* The arrays of a gradient by their bits. */
+typedef struct part {
+    int bit;
+    size_t count, values; /* where in the message */
+} part;
+#define PART(bit, name)                                                                            \
+    {                                                                                              \
+        CAROM_PARAMETER_GRADIENT_T_##bit, offsetof(carom_parameter_gradient_t, num_##name),        \
+            offsetof(carom_parameter_gradient_t, name)                                             \
+    }
+static const part PARTS[] = {
+    PART(Q0, q0),
+    PART(V0, v0),
+    PART(MASS, mass),
+    PART(INERTIA, inertia),
+    PART(FRICTION, friction),
+    PART(RESTITUTION, restitution),
+    PART(GRAVITY, gravity),
+    PART(FORCE, force),
+    PART(FORCE_STEPS, force_steps),
+    PART(RADIUS, radius),
+    PART(VERTICES, vertices),
+    PART(ANCHORS, anchors),
+    PART(DT, dt),
+};
+#undef PART
+enum { N_PARTS = sizeof PARTS / sizeof PARTS[0], ALL = (1 << N_PARTS) - 1 };
+
+static int part_count(const carom_parameter_gradient_t *m, const part *p)
+{
+    return *(const int32_t *)((const char *)m + p->count);
+}
+
+static const double *part_values(const carom_parameter_gradient_t *m, const part *p)
+{
+    return *(double *const *)((const char *)m + p->values);
+}
+
+/* The gradient of one request; destroy it. */
+static carom_parameter_gradient_t *ask(bench *b, const carom_loss_gradient_t *loss)
+{
+    bench_clear(b);
+    bench_do(b, pack_loss(loss));
+    expect_reply(b, CAROM_REPLY_T_OK, loss->seq, loss->seq + 1, "");
+    return bench_gradient(b);
+}
+
+/* Any mask: the arrays of its bits, as among all, and no others. */
+static void every_mask_gives_its_arrays(void **state)
+{
+    (void)state;
+    bench *b = do_open();
+    do_recorded(b, 2, 0, 40);
+    const carom_loss_gradient_t whole = loss_of(CLIENT, SESSION, 3, 40, 4, ALL);
+    carom_parameter_gradient_t *all = ask(b, &whole);
+    for (int64_t seq = 4; seq < 4 + 2 * N_PARTS; seq++) {
+        /* each alone, and each left out */
+        const int bit = 1 << ((seq - 4) % N_PARTS);
+        const int mask = seq < 4 + N_PARTS ? bit : ALL & ~bit;
+        const carom_loss_gradient_t loss = loss_of(CLIENT, SESSION, seq, 40, 4, mask);
+        carom_parameter_gradient_t *m = ask(b, &loss);
+        assert_int_equal(m->wanted, mask);
+        for (int k = 0; k < N_PARTS; k++) {
+            const int n = part_count(m, &PARTS[k]);
+            assert_int_equal(n, mask & PARTS[k].bit ? part_count(all, &PARTS[k]) : 0);
+            if (!n) continue;
+            const double *x = part_values(all, &PARTS[k]);
+            /* what is not asked for is not computed: sums of other terms, rounded otherwise */
+            assert_near_array("part", n, part_values(m, &PARTS[k]), x, 1e-13 * near_norm(n, x));
+        }
+        carom_parameter_gradient_t_destroy(m);
+    }
+    carom_parameter_gradient_t_destroy(all);
+    bench_destroy(b);
+}
+
+/* Cotangents of several states, in any order and twice for one of them, the start included: their
+ * gradients add up. */
+static void losses_of_any_steps_add_up(void **state)
+{
+    enum { N_BARS = 4, N = 12 };
+    int64_t bar_step[N_BARS] = {30, 0, 12, 30};
+    double q_bar[N_BARS * N], v_bar[N_BARS * N];
+    double sum[N_PARTS][3 * 4 * 40] = {{0}};
+    (void)state;
+    for (int k = 0; k < N_BARS * N; k++) {
+        q_bar[k] = cos(1.7 * k);
+        v_bar[k] = sin(2.3 * k);
+    }
+    bench *b = do_open();
+    do_recorded(b, 2, 0, 40);
+    for (int i = 0; i <= N_BARS; i++) {
+        const int together = i == N_BARS;
+        carom_loss_gradient_t loss = loss_of(CLIENT, SESSION, 3 + i, 0, 0, ALL);
+        loss.num_bars = together ? N_BARS : 1;
+        loss.num_bar_coords = N * loss.num_bars;
+        loss.bar_step = together ? bar_step : &bar_step[i];
+        loss.q_bar = together ? q_bar : &q_bar[i * N];
+        loss.v_bar = together ? v_bar : &v_bar[i * N];
+        carom_parameter_gradient_t *m = ask(b, &loss);
+        for (int k = 0; k < N_PARTS; k++) {
+            const int n = part_count(m, &PARTS[k]);
+            const double *x = part_values(m, &PARTS[k]);
+            assert_true(n <= 3 * 4 * 40);
+            /* rounding of sums of numbers of this size */
+            const double tol = 1e-12 * (1 + near_norm(n, sum[k]));
+            if (together) assert_near_array("sum", n, x, sum[k], tol);
+            for (int j = 0; j < n; j++) sum[k][j] += x[j];
+        }
+        carom_parameter_gradient_t_destroy(m);
+    }
     bench_destroy(b);
 }
 
@@ -131,6 +247,60 @@ static void descent_changes_the_scene(void **state)
     assert_near_array("gravity", 2, s->gravity, new_gravity, 2e-15);
     assert_near_array("radius", 4, s->radius, new_radius, 1e-15);
     assert_int_equal(s->seq, 3);
+    carom_scene_t_destroy(s);
+    bench_destroy(b);
+}
+
+/* Of q0, v0, inertia, force and vertices: static bodies keep their velocity, inertia stays
+ * positive.
+ */
+static void descent_moves_states_and_forces(void **state)
+{
+    enum { N = 4 };
+    double q0[3 * N] = {0}, v0[3 * N], force[3 * N], inertia[N], vertices[32] = {0};
+    (void)state;
+    bench *b = do_open();
+    const carom_scene_t old = scene_of(CLIENT, SESSION, 1);
+    for (int k = 0; k < 3 * N; k++) {
+        v0[k] = k + 1;
+        force[k] = -k;
+    }
+    for (int k = 0; k < N; k++) inertia[k] = k == 2 ? 1e6 : 0.01;
+    q0[3 * 1 + 2] = -0.5;
+    vertices[0] = 0.25;
+    carom_parameter_gradient_t d =
+        descent_of(2,
+                   CAROM_PARAMETER_GRADIENT_T_Q0 | CAROM_PARAMETER_GRADIENT_T_V0 |
+                       CAROM_PARAMETER_GRADIENT_T_INERTIA | CAROM_PARAMETER_GRADIENT_T_FORCE |
+                       CAROM_PARAMETER_GRADIENT_T_VERTICES,
+                   0.5);
+    d.num_q0 = d.num_v0 = d.num_force = 3 * N;
+    d.num_inertia = N;
+    d.num_vertices = old.num_vertex_coords;
+    assert_true(d.num_vertices <= 32);
+    d.q0 = q0;
+    d.v0 = v0;
+    d.force = force;
+    d.inertia = inertia;
+    d.vertices = vertices;
+    bench_do(b, pack_descent(&d));
+    expect_reply(b, CAROM_REPLY_T_OK, 2, 3, "");
+    carom_scene_t *s = bench_scene(b);
+    for (int k = 0; k < 3 * N; k++) {
+        const int moves = old.body_type[k / 3] == CAROM_SCENE_T_DYNAMIC;
+        assert_near_case("v", k, s->v[k], moves ? old.v[k] - 0.5 * v0[k] : 0, 1e-15);
+        assert_near_case("force", k, s->force[k], old.force[k] - 0.5 * force[k], 1e-15);
+        assert_near_case("q", k, s->q[k], old.q[k] - 0.5 * q0[k], 1e-15);
+    }
+    for (int k = 0; k < N; k++) {
+        const double least = 0.01 * old.inertia[k];
+        if (old.body_type[k] != CAROM_SCENE_T_DYNAMIC) continue;
+        assert_near_case("inertia", k, s->inertia[k],
+                         fmax(old.inertia[k] - 0.5 * inertia[k], least), 1e-15);
+    }
+    for (int k = 0; k < old.num_vertex_coords; k++) {
+        assert_near_case("vertex", k, s->vertices[k], old.vertices[k] - 0.5 * vertices[k], 1e-14);
+    }
     carom_scene_t_destroy(s);
     bench_destroy(b);
 }
@@ -249,8 +419,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(gradient_is_that_of_the_library),
+        cmocka_unit_test(every_mask_gives_its_arrays),
+        cmocka_unit_test(losses_of_any_steps_add_up),
         cmocka_unit_test(tapes_follow_the_requests),
         cmocka_unit_test(descent_changes_the_scene),
+        cmocka_unit_test(descent_moves_states_and_forces),
         cmocka_unit_test(descended_sessions_step_on),
         cmocka_unit_test(anchors_descend_along_the_chain_rule),
         cmocka_unit_test(bad_descents_are_refused),
