@@ -211,13 +211,14 @@ static verdict judge(const scene *s, int array, int entry, double g, double larg
         const double d = difference(s, array, entry, step, &e);
         if (isnan(d)) continue;
         *best = d;
+        v = VAGUE_THERE;
         if (fabs(d - g) <= fmax(DOUBT * e, FLOOR * largest)) {
-            return DOUBT * e <= VAGUE * largest ? RIGHT : VAGUE_THERE;
+            if (DOUBT * e <= VAGUE * largest) return RIGHT;
+            continue;
         }
         /* Two that agree with each other and not with g. */
         if (fabs(d - before) < FIRM * fabs(d - g)) return WRONG;
         before = d;
-        v = VAGUE_THERE;
     }
     return v;
 }
