@@ -59,7 +59,7 @@ def draw(rows, out):
     engines = list(dict.fromkeys(r["engine"] for r in rows))
     figure, axes = plt.subplots(2, (len(cases) + 1) // 2, figsize=(13, 6), sharey=True, squeeze=False)
     for axis in axes.flat[len(cases):]:
-        axis.set_visible(False)
+        axis.set_axis_off()
     for axis, case in zip(axes.flat, cases):
         for k, engine in enumerate(engines):
             mine = [r for r in rows if (r["scene"], r["what"], r["engine"]) == (*case, engine)]
@@ -68,7 +68,9 @@ def draw(rows, out):
                         "o" if engine.startswith("carom") else "s", color=f"C{k}", label=engine)
         axis.set_title(f"{case[0]}, by {case[1]}", fontsize=9)
         axis.grid(alpha=0.3)
-    axes.flat[0].legend(fontsize=6)
+    handles, names = axes.flat[0].get_legend_handles_labels()
+    spare = axes.flat[-1]
+    spare.legend(handles, names, fontsize=7, loc="center" if len(cases) % 2 else "upper right")
     figure.supxlabel("seconds of a run with its gradient", fontsize=9)
     figure.supylabel("relative error of the derivative", fontsize=9)
     figure.tight_layout()
