@@ -19,7 +19,7 @@ import time
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 
-N_PRECISION = 17
+N_PRECISION = 20
 GROWTH = ("free", "chain", "stack", "pyramid", "pile", "islands", "hub")
 
 

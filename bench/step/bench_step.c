@@ -6,10 +6,9 @@
  * largest overlap at the end and how far bodies moved that should rest, measured from the poses
  * with carom_collide for all alike.  A failed step ends in exit code 1. */
 #include "bench/solver/clock.h"
-#include "scene.h"
+#include "poses.h"
 
-#include "carom/broadphase.h"
-#include "carom/collide.h"
+#include "carom/base.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -27,101 +26,6 @@ typedef struct figures {
     counters c;     /* of one round */
     double overlap, moved;
 } figures;
-
-/* Poses of a world as carom's shapes. */
-typedef struct snapshot {
-    const scene *s;
-    double *q;
-    carom_vec2 (*corners)[4];
-    carom_shape *shapes;
-    carom_box *boxes;
-} snapshot;
-
-static void *room(int n, size_t size)
-{
-    void *p = calloc((size_t)n + 1, size);
-    if (!p) abort();
-    return p;
-}
-
-static carom_pose pose_of(const snapshot *t, int k)
-{
-    const carom_pose p = {t->q[3 * k], t->q[3 * k + 1], t->q[3 * k + 2]};
-    return p;
-}
-
-static carom_box no_box(void)
-{
-    const carom_box none = {{HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL}};
-    return none;
-}
-
-static snapshot take(const scene *s, const contender *c, void *self)
-{
-    snapshot t = {s, room(3 * s->n_bodies, sizeof(double)),
-                  room(s->n_bodies, 4 * sizeof(carom_vec2)), room(s->n_bodies, sizeof(carom_shape)),
-                  room(s->n_bodies, sizeof(carom_box))};
-    for (int k = 0; k < s->n_bodies; k++) {
-        const scene_body *b = &s->bodies[k];
-        const int disc = b->shape == SHAPE_DISC;
-        const carom_vec2 v[4] = {
-            {-b->hx, -b->hy}, {b->hx, -b->hy}, {b->hx, b->hy}, {-b->hx, b->hy}};
-        const carom_vec2 center = {0, 0};
-        for (int i = 0; i < 4; i++) t.corners[k][i] = disc ? center : v[i];
-        const carom_shape shape = {disc ? b->hx : 0, disc ? 1 : 4, t.corners[k]};
-        t.shapes[k] = shape;
-        c->place(self, k, &t.q[3 * k]);
-        t.boxes[k] = b->shape == SHAPE_NONE ? no_box() : carom_shape_box(&shape, pose_of(&t, k));
-    }
-    return t;
-}
-
-static void release(snapshot *t)
-{
-    free(t->q);
-    free(t->corners);
-    free(t->shapes);
-    free(t->boxes);
-}
-
-static int pinned(const scene *s, int a, int b)
-{
-    for (int k = 0; k < s->n_pins; k++) {
-        const scene_pin *p = &s->pins[k];
-        if ((p->a == a && p->b == b) || (p->a == b && p->b == a)) return 1;
-    }
-    return 0;
-}
-
-static double largest_overlap(const snapshot *t)
-{
-    carom_broadphase *broadphase = NULL;
-    const carom_pair *pairs;
-    int n;
-    double worst = 0;
-    if (carom_broadphase_create(NULL, &broadphase)) abort();
-    if (carom_broadphase_pairs(broadphase, t->s->n_bodies, t->boxes, &n, &pairs)) abort();
-    for (int k = 0; k < n; k++) {
-        const int a = pairs[k].a;
-        const int b = pairs[k].b;
-        if (pinned(t->s, a, b) || !(t->s->bodies[a].moves || t->s->bodies[b].moves)) continue;
-        const carom_manifold m =
-            carom_collide(&t->shapes[a], pose_of(t, a), &t->shapes[b], pose_of(t, b), 0);
-        if (m.count) worst = fmax(worst, -m.distance);
-    }
-    carom_broadphase_destroy(broadphase);
-    return worst;
-}
-
-static double largest_move(const snapshot *t)
-{
-    double worst = 0;
-    for (int k = 0; t->s->rests && k < t->s->n_bodies; k++) {
-        const double *q = t->s->bodies[k].q;
-        worst = fmax(worst, hypot(t->q[3 * k + 1] - q[1], t->q[3 * k + 2] - q[2]));
-    }
-    return worst;
-}
 
 static int step_on_the_clock(const scene *s, const contender *c, void *self, counters *count)
 {
@@ -145,12 +49,10 @@ static double run(const scene *s, const contender *c, figures *f)
     const double start = cpu_seconds();
     f->n_steps = step_on_the_clock(s, c, self, &count);
     const double seconds = (cpu_seconds() - start) / f->n_steps;
-    snapshot t = take(s, c, self);
     f->c = count;
     if (warm.worst < 0 || warm.worst > f->c.worst) f->c.worst = warm.worst;
-    f->overlap = largest_overlap(&t);
-    f->moved = largest_move(&t);
-    release(&t);
+    f->overlap = largest_overlap(s, c, self);
+    f->moved = s->rests ? largest_move(s, c, self) : 0;
     c->destroy(self);
     return seconds;
 }
