@@ -23,7 +23,8 @@ N_PRECISION = 20
 GROWTH = ("free", "chain", "stack", "pyramid", "pile", "islands", "hub")
 
 
-# A piece is one command; `scene` pipes a scene of the program into a script of the peers' Python.
+# A piece is one command; `scene` pipes a scene of the program into a script of the peers' Python; `count`
+# hands the program to the part's count.py.
 def precision_pieces():
     return [piece for k in range(N_PRECISION) for piece in ([str(k)], ["scene", str(k)])]
 
@@ -36,6 +37,10 @@ def growth_pieces():
     return [[family] for family in GROWTH]
 
 
+def phases_pieces():
+    return [["count", str(k)] for k in (2, 3, 4, 5, 6)]
+
+
 def whole():
     return [[]]
 
@@ -44,6 +49,7 @@ def whole():
 PARTS = {
     "precision": ("precision/bench_precision", precision_pieces, "error against run time"),
     "step": ("step/bench_step", step_pieces, "microseconds per step beside peers, and what rests"),
+    "phases": ("step/bench_step", phases_pieces, "instructions of a step by phase"),
     "growth": ("growth/bench_growth", growth_pieces, "time, memory and work against the number of bodies"),
     "gradient": ("gradient/bench_gradient", whole, "cost and error of gradients"),
     "stability": ("stability/bench_stability", whole, "the stability atlas"),
@@ -53,6 +59,7 @@ PARTS = {
 
 # Programs that print their page themselves, and know no --quick: their rounds are short.
 PLAIN = ("step",)
+ALWAYS_WHOLE = (*PLAIN, "phases")
 
 
 class Stopped(Exception):
@@ -63,7 +70,7 @@ def say(text):
     print(text, flush=True)
 
 
-def run_piece(command, path, reader=None):
+def run_piece(command, path, reader=None, optional=False):
     """The output of a command, or of a reader of it, in path: whole or not at all."""
     partial = path + ".partial"
     with open(partial, "w", encoding="utf-8") as out, open(path + ".log", "w", encoding="utf-8") as log:
@@ -73,7 +80,7 @@ def run_piece(command, path, reader=None):
         else:
             code = subprocess.run(command, stdout=out, stderr=log, check=False).returncode
     # the atlas counts black cells in its code: its figures are whole all the same
-    if code < 0 or (os.path.getsize(partial) == 0 and not reader):
+    if code < 0 or (os.path.getsize(partial) == 0 and not (reader or optional)):
         raise Stopped(f"{' '.join(command)} ended with {code}; see {path}.log")
     os.replace(partial, path)
 
@@ -136,17 +143,22 @@ class Report:
         os.makedirs(folder, exist_ok=True)
         since = time.time()
         files, commands = [], []
-        quick = ["--quick"] if self.options.quick and part not in PLAIN else []
+        quick = ["--quick"] if self.options.quick and part not in ALWAYS_WHOLE else []
         for k, arguments in enumerate(pieces()):
             piped = arguments[:1] == ["scene"]
             words = arguments if piped else quick + arguments
             reader = [self.options.peers, os.path.join(ROOT, "bench", part, "peers.py"), *quick]
+            command = [self.program(part), *words]
+            if arguments[:1] == ["count"]:
+                archives = glob.glob(os.path.join(self.options.bin, "..", "lib*", "*.a"))
+                script = os.path.join(ROOT, "bench", part, "count.py")
+                command = [sys.executable, script, self.program(part), arguments[1], *archives]
             commands.append(" ".join([os.path.basename(program), *words]) +
                             (f" | peers.py {' '.join(quick)}" if piped else ""))
             files.append(os.path.join(folder, f"{k:02d}.csv"))
             self.progress(part, k, len(pieces()), arguments)
             if not os.path.exists(files[-1]):
-                run_piece([self.program(part), *words], files[-1], reader if piped else None)
+                run_piece(command, files[-1], reader if piped else None, command[0] == sys.executable)
         path = os.path.join(self.options.out, f"{part}.{'md' if part in PLAIN else 'csv'}")
         if part in PLAIN:
             write_page(PARTS[part][2], files, path)

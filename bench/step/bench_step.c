@@ -1,10 +1,10 @@
 /* Microseconds per step of small and large scenes: carom with each integrator beside Box2D 2.4 and
  * Chipmunk 7 where these are installed, one thread, in one run.
  *
- * Usage: bench_step [scene [contender]]: numbers from 0; prints a table for docs/performance.md.
- * Each figure is the least over rounds of the mean over the scene's steps.  Beside it stand the
- * largest overlap at the end and how far bodies moved that should rest, measured from the poses
- * with carom_collide for all alike.  A failed step ends in exit code 1. */
+ * Usage: bench_step [scene [contender]]: numbers from 0, or a contender's name; prints a table for
+ * docs/performance.md. Each figure is the least over rounds of the mean over the scene's steps.
+ * Beside it stand the largest overlap at the end and how far bodies moved that should rest,
+ * measured from the poses with carom_collide for all alike.  A failed step ends in exit code 1. */
 #include "bench/solver/clock.h"
 #include "poses.h"
 
@@ -13,6 +13,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Rounds go on for so long [s], and are at least so many. */
 static const double LONG_ENOUGH = 0.3;
@@ -94,10 +95,18 @@ static void print_row(const scene *s, const contender *c, const figures *f, doub
     fflush(stdout);
 }
 
+/* A wish is a number or a name; none: all. */
+static int is_wanted(const char *wish, int i, const contender *c)
+{
+    char number[16];
+    snprintf(number, sizeof number, "%d", i);
+    return !wish || strcmp(wish, number) == 0 || strcmp(wish, c->name) == 0;
+}
+
 int main(int argc, char **argv)
 {
     const int only_scene = argc > 1 ? atoi(argv[1]) : -1;
-    const int only_contender = argc > 2 ? atoi(argv[2]) : -1;
+    const char *only_contender = argc > 2 ? argv[2] : NULL;
     const contender *all[MAX_CONTENDERS] = {NULL};
     int n = 0;
     int failed = 0;
@@ -117,7 +126,7 @@ int main(int argc, char **argv)
         scene s = make_scene(k);
         double peer = 0;
         for (int i = 0; i < n; i++) {
-            if (only_contender >= 0 && only_contender != i) continue;
+            if (!is_wanted(only_contender, i, all[i])) continue;
             const figures f = measure(&s, all[i]);
             if (i == 0 && first_own > 0) peer = f.seconds;
             print_row(&s, all[i], &f, peer, i >= first_own);
