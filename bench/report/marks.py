@@ -73,6 +73,45 @@ def steps(out):
     return lines
 
 
+def table_of(name):
+    with open(os.path.join(HERE, name), encoding="ascii") as file:
+        return list(csv.DictReader(file))
+
+
+def gradients(out):
+    """Errors and costs of gradients beside the marks, from gradient.csv; none when that has not run."""
+    path = os.path.join(out, "gradient.csv")
+    if not os.path.exists(path):
+        return []
+    with open(path, encoding="ascii") as file:
+        rows = [r for r in csv.DictReader(line for line in file if not line.startswith("#"))
+                if r["engine"].startswith("carom")]
+    lines = ["", "## Gradients", "", "Relative error of a derivative that has a closed form; carom: the worst of its steps.", "",
+             "| scene | by | mark | who | carom | |", "|---|---|---|---|---|---|"]
+    for m in table_of("gradient_marks.csv"):
+        errors = [float(r["error"]) for r in rows
+                  if (r["part"], r["scene"], r["what"]) == ("closed", m["scene"], m["what"])]
+        if errors:
+            own = max(errors)
+            lines.append(f"| {m['scene']} | {m['what']} | {m['error']} | {m['who']} | {own:.1e} | "
+                         f"{'won' if own <= float(m['error']) else 'lost'} |")
+    lines += ["", "Microseconds per step beside the engine of the paper (de Avila Belbute-Peres et al., 2018); gradient: forward and backward by every parameter.", "",
+              "| scene | mark, forward | mark, with gradient | carom, forward | carom, with gradient | by | |",
+              "|---|---|---|---|---|---|---|"]
+    for m in table_of("gradient_cost_marks.csv"):
+        cost = {(r["engine"], r["what"]): 1e6 * float(r["seconds"]) for r in rows
+                if (r["part"], r["scene"]) == ("cost", m["scene"])}
+        for engine in dict.fromkeys(e for e, _ in cost):
+            forward, backward = cost.get((engine, "forward")), cost.get((engine, "backward by all"))
+            if forward is None or backward is None:
+                continue
+            both = cost.get((engine, "recorded"), forward) + backward
+            won = forward <= float(m["forward"]) and both <= float(m["gradient"])
+            lines.append(f"| {m['scene']} | {m['forward']} | {m['gradient']} | {forward:.3g} | {both:.3g} | "
+                         f"{engine} | {'won' if won else 'lost'} |")
+    return lines
+
+
 def main(path, out):
     plot = precision_plot()
     rows = plot.read(path)
@@ -93,7 +132,7 @@ def main(path, out):
     closing = (f"\n{won} won, {lost} lost. Where the peers of this run do not reach an error, the mark stands for them.\n\n"
                "Errors below these marks, and scenes with none, are in precision.md: carom alone reaches them.\n")
     with open(os.path.join(out, "marks.md"), "w", encoding="ascii") as file:
-        file.write(HEAD + "\n".join(lines) + "\n" + closing + "\n".join(steps(out)) + "\n")
+        file.write(HEAD + "\n".join(lines) + "\n" + closing + "\n".join(steps(out) + gradients(out)) + "\n")
 
 
 if __name__ == "__main__":

@@ -176,14 +176,12 @@ class Report:
         say(f"  {part:<12} [{bar}] {k}/{n} {' '.join(arguments)}")
 
     def plot(self, part, path):
-        folder = os.path.join(ROOT, "bench", part)
-        scripts = [os.path.join(folder, "plot.py")]
-        if part in ("precision", "step") and os.path.exists(os.path.join(self.options.out, "precision.csv")):
-            scripts.append(os.path.join(HERE, "marks.py"))
-            path = os.path.join(self.options.out, "precision.csv")
-        for script in scripts:
-            if os.path.exists(script) and part not in PLAIN or script.endswith("marks.py"):
-                subprocess.run([sys.executable, script, path, self.options.out], check=True)
+        script = os.path.join(ROOT, "bench", part, "plot.py")
+        if os.path.exists(script) and part not in PLAIN:
+            subprocess.run([sys.executable, script, path, self.options.out], check=True)
+        precision = os.path.join(self.options.out, "precision.csv")
+        if part in ("precision", "step", "gradient") and os.path.exists(precision):
+            subprocess.run([sys.executable, os.path.join(HERE, "marks.py"), precision, self.options.out], check=True)
 
     def page(self):
         lines = ["# Reports", "",
