@@ -40,6 +40,7 @@ static carom_status prepare(carom_world *w, int i, const double *q, const double
     s->force = outer->force;
     s->n_contacts = outer->n_contacts;
     s->ahead = 0;
+    s->keep = outer->keep;
     s->end = CRM_END_FRAME;
     for (int k = 0; k < s->n_contacts; k++) {
         s->contacts[k] = outer->contacts[k];

@@ -100,7 +100,7 @@ static double next_sides(const carom_world *w, const crm_substep *s, const crm_s
         if (w->rows.mu[k] > 0 && !s->slips[k])
             next->ct[k] = crm_slip(w, &x, s->q0, s->q1) / s->h - ut;
         if (c->mode[k] == CAROM_SEPARATED) {
-            largest = fmax(largest, -miss);
+            if (!s->keep) largest = fmax(largest, -miss);
             continue;
         }
         largest = fmax(largest, s->h * fabs(next->cn[k] - c->cn[k]));

@@ -48,6 +48,21 @@ static void take_velocities(const carom_world *w, const double *v, double *to)
     }
 }
 
+/* A stage whose modes are given. */
+static carom_status run_kept(carom_world *w, crm_substep *s, crm_solve *c)
+{
+    const carom_contact_problem p = crm_problem(w, s, c);
+    carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
+    memcpy(c->mode, s->keep, (size_t)s->n_contacts);
+    const carom_status e = carom_contact_modes(w->solver, &p, &x);
+    w->effort++;
+    w->stats->factorizations++;
+    if (e < 0) return e;
+    s->degenerate = 0;
+    take_velocities(w, w->rows.v, c->v);
+    return e;
+}
+
 static carom_status run_once(carom_world *w, crm_substep *s, crm_solve *c, int use_guess)
 {
     if (!s->n_contacts && !w->island->n_rows) {
@@ -55,6 +70,7 @@ static carom_status run_once(carom_world *w, crm_substep *s, crm_solve *c, int u
         take_velocities(w, w->rows.u, c->v);
         return CAROM_OK;
     }
+    if (s->keep && (c->kind == CRM_STAGE_1 || c->kind == CRM_STAGE_2)) return run_kept(w, s, c);
     carom_contact_stats stats = {0};
     const carom_contact_problem p = crm_problem(w, s, c);
     carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};

@@ -175,6 +175,7 @@ typedef struct crm_substep {
     crm_contact *moved;      /* the same contacts at the pose of the problem under way */
     unsigned char *pressing; /* per contact: closed by force, so held at gap 0 from both sides */
     signed char *slips;      /* per contact: the sign of the slip that it is made to keep, or 0 */
+    const unsigned char *keep; /* per contact: the modes of both stages; NULL: they are found */
     double *target;          /* per contact: gap that stage 1 aims at [m] */
     double *joint_target;    /* per joint row: error that stage 1 aims at [m] */
     double restitution;      /* factor on all restitutions: 1, or 0 when relaxed */

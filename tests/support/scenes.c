@@ -50,6 +50,14 @@ int scene_floor(carom_world *w, double friction, double restitution)
     return add_box(w, &d, 20, 1);
 }
 
+int scene_belt(carom_world *w, double speed, double friction)
+{
+    carom_body_def d = carom_body_at(CAROM_KINEMATIC, 0, -1);
+    d.velocity[1] = speed;
+    d.friction = friction;
+    return add_box(w, &d, 20, 1);
+}
+
 int scene_box(carom_world *w, double mass, double hx, double hy, carom_pose pose, double friction,
               double restitution)
 {

@@ -16,6 +16,8 @@ extern double scene_tolerance;
 carom_world *scene_world(double g, double dt);
 /* Static box 40 x 2 whose top is y = 0; index of the body. */
 int scene_floor(carom_world *w, double friction, double restitution);
+/* The same, moving at `speed` along x. */
+int scene_belt(carom_world *w, double speed, double friction);
 /* Dynamic box with half sides hx, hy, uniform density, at (x, y, angle), at rest. */
 int scene_box(carom_world *w, double mass, double hx, double hy, carom_pose pose, double friction,
               double restitution);
