@@ -85,6 +85,31 @@ def run_piece(command, path, reader=None, optional=False):
     os.replace(partial, path)
 
 
+def commits_in(folder):
+    """Those at which the pieces of the folder were run."""
+    path = os.path.join(folder, "commits")
+    if not os.path.exists(path):
+        return []
+    with open(path, encoding="ascii") as file:
+        return file.read().split()
+
+
+def note_commit(folder):
+    now = output("git", "rev-parse", "--short", "HEAD")
+    known = commits_in(folder)
+    if now not in known:
+        with open(os.path.join(folder, "commits"), "w", encoding="ascii") as file:
+            file.write(" ".join([*known, now]) + "\n")
+
+
+def seconds_of(piece):
+    """Zero where the run ended before it could be said."""
+    if not os.path.exists(piece + ".seconds"):
+        return 0.0
+    with open(piece + ".seconds", encoding="ascii") as file:
+        return float(file.read())
+
+
 def join(pieces, path):
     """All pieces with the header of the first."""
     with open(path, "w", encoding="utf-8") as out:
@@ -141,7 +166,6 @@ class Report:
         if self.options.again:
             shutil.rmtree(folder, ignore_errors=True)
         os.makedirs(folder, exist_ok=True)
-        since = time.time()
         files, commands = [], []
         quick = ["--quick"] if self.options.quick and part not in ALWAYS_WHOLE else []
         for k, arguments in enumerate(pieces()):
@@ -158,15 +182,19 @@ class Report:
             files.append(os.path.join(folder, f"{k:02d}.csv"))
             self.progress(part, k, len(pieces()), arguments)
             if not os.path.exists(files[-1]):
+                note_commit(folder)
+                since = time.time()
                 run_piece(command, files[-1], reader if piped else None, command[0] == sys.executable)
+                with open(files[-1] + ".seconds", "w", encoding="ascii") as file:
+                    file.write(f"{time.time() - since:.1f}\n")
         path = os.path.join(self.options.out, f"{part}.{'md' if part in PLAIN else 'csv'}")
         if part in PLAIN:
             write_page(PARTS[part][2], files, path)
         else:
             join(files, path)
         self.plot(part, path)
-        seconds = time.time() - since
-        self.remember(part, {"kind": self.kind, "seconds": seconds, "commands": commands,
+        seconds = sum(map(seconds_of, files))
+        self.remember(part, {"kind": self.kind, "seconds": seconds, "commands": commands, "commits": commits_in(folder),
                              "date": datetime.date.today().isoformat()})
         say(f"  {part:<12} done in {seconds:.0f} s")
 
@@ -186,16 +214,16 @@ class Report:
     def page(self):
         lines = ["# Reports", "",
                  "Made by `./dev report`; nothing on these pages is written by hand. `--quick` takes minutes, the full run hours.", "",
-                 "| part | shows | run | date | took |", "|---|---|---|---|---|"]
+                 "| part | shows | run | commit | date | took |", "|---|---|---|---|---|---|"]
         for part, (_, _, shows) in PARTS.items():
             facts = self.done.get(part)
             page = f"[{part}]({part}.md)" if os.path.exists(os.path.join(self.options.out, f"{part}.md")) else part
             if facts:
-                lines.append(f"| {page} | {shows} | {facts['kind']} | {facts['date']} | {facts['seconds']:.0f} s |")
+                lines.append(f"| {page} | {shows} | {facts['kind']} | {', '.join(facts.get('commits', []))} | {facts['date']} | {facts['seconds']:.0f} s |")
             else:
-                lines.append(f"| {page} | {shows} | not run | | |")
+                lines.append(f"| {page} | {shows} | not run | | | |")
         if os.path.exists(os.path.join(self.options.out, "marks.md")):
-            lines.append("| [marks](marks.md) | carom beside every mark of its peers | with precision | | |")
+            lines.append("| [marks](marks.md) | carom beside every mark of its peers | with precision | | | |")
         lines += ["", "## Machine and versions", "", *machine(), "", "## Commands", ""]
         for part in PARTS:
             commands = self.done.get(part, {}).get("commands", [])
@@ -227,7 +255,7 @@ def package(name):
 def machine():
     return [
         f"* {os.cpu_count()} cores, {cpu()}; {platform.system()} {platform.release()}, {platform.machine()}",
-        f"* carom {output('git', 'rev-parse', '--short', 'HEAD')}; {output('cc', '--version').splitlines()[0]}; Release",
+        f"* {output('cc', '--version').splitlines()[0]}; Release",
         f"* Box2D {package('box2d')}, Chipmunk {chipmunk()}; Python {platform.python_version()}",
         "* Other programs may have run beside it: ratios within a run count, not seconds.",
     ]
