@@ -44,11 +44,10 @@ static void speed_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, 
                       const double row[6], double speed_bar, double *v_bar, double row_bar[6])
 {
     const int late = c->kind == CRM_STAGE_2;
-    for (int k = 0; k < 6; k++) {
+    for (int k = 0; j->damping > 0 && k < 6; k++) {
         const int at = 3 * (k < 3 ? j->body_a : j->body_b) + k % 3;
         row_bar[k] += speed_bar * crm_seen_velocity(s, c, at);
-        v_bar[at] += (late ? 2 : 1) * speed_bar * row[k];
-        if (late) r->late_bar[at] -= speed_bar * row[k];
+        *(late ? &r->late_bar[at] : &v_bar[at]) += speed_bar * row[k];
     }
 }
 
@@ -60,7 +59,7 @@ static void add_to(double *array, int joint, double x)
 /* - d crm_soften(x, t) / dt */
 static double by_times(double x, double t)
 {
-    return pow(x, 5) * t * t * t * crm_soften_slope(x, t);
+    return x * x * pow(x * t, 7) * crm_soften_slope(x, t);
 }
 
 /* One spring: force = -(k way + d speed) with k, d softened by h and weight. */
@@ -116,11 +115,43 @@ static void motor_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, 
     crm_joint_give(r, joint, &bar);
 }
 
+/* b_bar of a push along row. */
+static double pushed(const crm_reverse *r, const crm_joint *j, const double row[6])
+{
+    const carom_world *w = r->world;
+    double sum = 0;
+    for (int k = 0; k < 6; k++) {
+        const int i = crm_unknown(w, k < 3 ? j->body_a : j->body_b);
+        if (i < 0) continue;
+        sum += w->rows.inv_mass[3 * i + k % 3] * r->bars.u[3 * i + k % 3] * row[k];
+    }
+    return sum;
+}
+
+void crm_seen_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *seen_bar)
+{
+    const carom_world *w = r->world;
+    crm_fields_seen_vjp(r, s, c, seen_bar);
+    for (int k = 0; w->island->n_driven && k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        crm_measure measures[2];
+        const int n = j->damping > 0 ? crm_spring_measures(j->kind, measures) : 0;
+        for (int i = 0; i < n; i++) {
+            const crm_push p = crm_spring_push(w, s, c, j, measures[i]);
+            const double speed_bar = -p.d * p.share * p.h * pushed(r, j, p.row);
+            for (int m = 0; m < 6; m++) {
+                seen_bar[3 * (m < 3 ? j->body_a : j->body_b) + m % 3] += speed_bar * p.row[m];
+            }
+        }
+    }
+}
+
 void crm_drive_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *v_bar,
                    double *q_bar, double *h_bar)
 {
     const carom_world *w = r->world;
     int first = 0;
+    if (w->n_fields) crm_fields_vjp(r, s, c, v_bar, q_bar, h_bar);
     for (int k = 0; w->island->n_driven && k < w->island->n_joints; k++) {
         const int joint = w->island->joints[k];
         const crm_joint *j = &w->joints[joint];
@@ -201,9 +232,9 @@ static double speed_jvp(const crm_substep *s, const crm_solve *c, const crm_join
 {
     const int late = c->kind == CRM_STAGE_2;
     double sum = 0;
-    for (int k = 0; k < 6; k++) {
+    for (int k = 0; j->damping > 0 && k < 6; k++) {
         const int at = 3 * (k < 3 ? j->body_a : j->body_b) + k % 3;
-        const double seen = late ? 2 * line->v[at] - line->v0[at] : line->v0[at];
+        const double seen = late ? 0 : line->v0[at]; /* of stage 2: crm_seen_jvp */
         sum += row_dot[k] * crm_seen_velocity(s, c, at) + row[k] * seen;
     }
     return sum;
@@ -261,6 +292,7 @@ void crm_drive_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, con
 {
     const carom_world *w = f->world;
     int first = 0;
+    if (w->n_fields) crm_fields_jvp(f, s, c, line);
     for (int k = 0; w->island->n_driven && k < w->island->n_joints; k++) {
         const int joint = w->island->joints[k];
         const crm_joint *j = &w->joints[joint];
@@ -270,6 +302,24 @@ void crm_drive_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, con
         for (int i = 0; i < n; i++) spring_jvp(f, s, c, joint, measures[i], line);
         if (j->n_rows > j->n_held) motor_jvp(f, s, c, joint, first + j->n_held, line);
         first += j->n_rows;
+    }
+}
+
+void crm_seen_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, const double *x)
+{
+    const carom_world *w = f->world;
+    const double none[6] = {0};
+    crm_fields_seen_jvp(f, s, c, x);
+    for (int k = 0; w->island->n_driven && k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        crm_measure measures[2];
+        const int n = j->damping > 0 ? crm_spring_measures(j->kind, measures) : 0;
+        for (int i = 0; i < n; i++) {
+            const crm_push p = crm_spring_push(w, s, c, j, measures[i]);
+            const double speed = crm_row_dot(p.row, x, j->body_a, j->body_b);
+            memset(f->dot.inv_mass, 0, 3 * (size_t)w->island->n_bodies * sizeof(double));
+            push_jvp(f, j, p.row, none, 0, -p.share * p.h * p.d * speed);
+        }
     }
 }
 

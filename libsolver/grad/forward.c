@@ -220,6 +220,15 @@ carom_status crm_solve_jvp(crm_forward *f, double *v_dot)
     return CAROM_OK;
 }
 
+carom_status crm_push_jvp(crm_forward *f, double *v_dot)
+{
+    carom_contact_direction push = {0};
+    push.u = f->dot.u;
+    if (f->problem.n_contacts || f->problem.n_joint_rows) return respond(f, &push, v_dot);
+    crm_scatter(f->world, f->dot.u, v_dot);
+    return CAROM_OK;
+}
+
 carom_status crm_sides_jvp(crm_forward *f, double *v_dot)
 {
     carom_contact_direction sides = {0};

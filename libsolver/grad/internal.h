@@ -204,7 +204,7 @@ typedef struct crm_reverse {
     crm_turn turn;
     int wants_shapes, wants_joints; /* 1: radii or vertices; anchors, axes, angles or lengths */
     double *solve_bar;         /* 3 n_bodies: cotangent of the velocity of the solve under way */
-    double *late_bar;          /* 3 n_bodies: of v0, through the springs of stage 2 */
+    double *late_bar;          /* 3 n_bodies: of v1, as forces of stage 2 see it */
     double *pose;              /* 3 n_bodies: end of an iteration of stage 1 */
     double *pose_bar;          /* 3 n_bodies: its cotangent */
     double *rest;              /* 3 n_bodies: what the passes of stage 1 have left to do */
@@ -283,12 +283,22 @@ void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double *je_
 void crm_joint_give(const crm_reverse *r, int joint, const crm_joint_bar *bar);
 
 /* drive.c: springs and motors in rows.u and rows of a solve: after crm_solve_vjp, before
- * crm_mass_vjp.  v_bar: of the velocity before the solve (of stage 2: of vh, and r->late_bar). */
+ * crm_mass_vjp.  v_bar: of the velocity before the solve (of stage 2: r->late_bar is that of v1).
+ */
 void crm_drive_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *v_bar,
                    double *q_bar, double *h_bar);
 /* The row of a motor that holds, in an iteration of stage 1 that ends at r->pose. */
 void crm_motor_side_vjp(crm_reverse *r, const crm_substep *s, int joint, int row, double *q0_bar,
                         double *h_bar);
+
+/* What the velocity that springs see in stage 2 has from the pushes of u_bar alone: adds. */
+void crm_seen_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *seen_bar);
+
+/* field.c */
+void crm_fields_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *v_bar,
+                    double *q_bar, double *h_bar);
+void crm_fields_seen_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c,
+                         double *seen_bar);
 
 /* reverse.c: the adjoint of one solve. */
 /* Problem and solution of solve c of s; rows in place. */
@@ -364,6 +374,11 @@ carom_contact_dot crm_limit_jvp(const carom_world *w, const double *q, int limit
 
 /* drive.c: after crm_rows_jvp; adds to dot.u, and sets rows and sides of motors. */
 void crm_drive_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, const crm_line *line);
+/* dot.u += what a change x of the velocity that is seen in stage 2 gives. */
+void crm_seen_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, const double *x);
+/* field.c */
+void crm_fields_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, const crm_line *line);
+void crm_fields_seen_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, const double *x);
 /* c_e of a motor that holds in an iteration of stage 1, which ends at f->pose, but for its speed.
  */
 double crm_motor_side_jvp(const crm_forward *f, const crm_substep *s, int joint, int row,
@@ -382,6 +397,8 @@ void crm_free_velocity_jvp(crm_forward *f, const crm_substep *s, const crm_solve
 void crm_targets_jvp(crm_forward *f, const crm_substep *s, const crm_line *line);
 /* Change of the solution along dot, of the island, to v_dot. */
 carom_status crm_solve_jvp(crm_forward *f, double *v_dot);
+/* The same along dot.u alone. */
+carom_status crm_push_jvp(crm_forward *f, double *v_dot);
 /* The same along dot.cn, dot.ct and dot.ce alone. */
 carom_status crm_sides_jvp(crm_forward *f, double *v_dot);
 /* q1 = q0 + h v: q_dot += h v_dot + h_dot v. */

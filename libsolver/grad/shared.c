@@ -87,12 +87,19 @@ double crm_border_acceleration(const carom_tape *t, int step, int k)
     if (step == 0 || w->bodies[b].type != CAROM_DYNAMIC) return 0;
     const double f = t->frames[step - 1].force[k];
     const double m = k % 3 ? w->mass[b] : w->inertia[b];
-    return f / m + crm_gravity(w, b, k % 3) -
+    double a[3] = {0, 0, 0};
+    const double *q = carom_tape_q(t, step);
+    if (w->n_fields) crm_field_acceleration(w, b, 0, q, carom_tape_v(t, step), a);
+    return a[k % 3] + f / m + crm_gravity(w, b, k % 3) -
            w->bodies[b].damping[k % 3 > 0] * carom_tape_v(t, step)[k];
 }
 
 carom_status crm_tape_current(const carom_tape *t)
 {
+    if (!crm_fields_have_slopes(t->world)) {
+        return crm_world_fail(t->world, CAROM_E_STATE,
+                              "a field has no derivative: give one, or do without gradients");
+    }
     if (t->revision == t->world->revision) return CAROM_OK;
     return crm_world_fail(t->world, CAROM_E_STATE,
                           "parameters changed since the recording; rewind and run again");

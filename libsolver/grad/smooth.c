@@ -222,12 +222,46 @@ double crm_largest(const carom_world *w, const double *x)
     return top;
 }
 
+/* r->rest = m with m = v_bar + S'm, S what a change of the velocity that forces see gives to v1. */
+static carom_status close_seen(crm_reverse *r, crm_substep *s, const double *v_bar)
+{
+    carom_world *w = r->world;
+    crm_anderson *a = &w->anderson;
+    const crm_solve *c = &s->solve[1];
+    const int n = 3 * w->island->n_bodies;
+    const double first = crm_largest(w, v_bar);
+    double error = HUGE_VAL;
+    crm_pose_solve(r, s, c);
+    carom_status e = crm_anderson_start(&w->memory, a, n);
+    if (e < 0) return e;
+    crm_gather(w, v_bar, a->point);
+    for (int k = 0; k < CRM_MAX_PASSES && error > CRM_PASS_TOL * first; k++) {
+        crm_scatter(w, a->point, r->rest);
+        e = crm_sides_vjp(r, r->rest, 0);
+        if (e < 0) return e;
+        crm_zero(w, r->solve_bar);
+        crm_seen_vjp(r, s, c, r->solve_bar);
+        crm_gather(w, r->solve_bar, a->value);
+        error = 0;
+        for (int i = 0; i < n; i++) {
+            a->value[i] += v_bar[3 * w->island->bodies[i / 3] + i % 3];
+            error = fmax(error, fabs(a->value[i] - a->point[i]));
+        }
+        if (!(error < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
+        crm_anderson_next(a);
+    }
+    crm_scatter(w, a->point, r->rest);
+    return error <= CRM_PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
+}
+
 /* v1 from vh at q1: leaves the cotangent of vh in r->solve_bar; q_bar gets that of the rows. */
 static carom_status stage_2_vjp(crm_reverse *r, crm_substep *s, double *q_bar, const double *v_bar,
                                 double *h_bar)
 {
     const crm_solve *c = &s->solve[1];
-    const carom_status e = crm_solve_vjp(r, s, c, v_bar);
+    const int sees = crm_sees_speed(r->world);
+    carom_status e = sees ? close_seen(r, s, v_bar) : CAROM_OK;
+    if (e >= 0) e = crm_solve_vjp(r, s, c, sees ? r->rest : v_bar);
     if (e < 0) return e;
     crm_zero(r->world, r->solve_bar);
     crm_free_velocity_vjp(r, s, c, r->solve_bar, h_bar);
@@ -364,7 +398,7 @@ carom_status crm_smooth_vjp(crm_reverse *r, crm_substep *s, double *q_bar, doubl
     } else {
         crm_zero(r->world, r->late_bar);
         e = stage_2_vjp(r, s, q_bar, v_bar, h_bar);
-        crm_copy(r->world, v_bar, r->late_bar);
+        crm_zero(r->world, v_bar);
     }
     for (int k = s->n_solves - 1; e >= 0 && k > 1; k--) {
         e = crm_correction_vjp(r, s, &s->solve[k], q_bar);

@@ -166,6 +166,38 @@ static carom_status stage_1_jvp(crm_forward *f, crm_substep *s, int n)
     return CAROM_OK;
 }
 
+/* x becomes x + S (x + S (x + ...)), S what a change of the velocity that forces see gives to v1.
+ */
+static carom_status close_seen(crm_forward *f, const crm_substep *s, const crm_solve *c, double *x)
+{
+    carom_world *w = f->world;
+    crm_anderson *a = &w->anderson;
+    const int n = 3 * w->island->n_bodies;
+    const double first = crm_largest(w, x);
+    double error = HUGE_VAL;
+    carom_status e = crm_anderson_start(&w->memory, a, n);
+    if (e < 0) return e;
+    crm_copy(w, f->rest, x);
+    crm_gather(w, x, a->point);
+    for (int k = 0; k < CRM_MAX_PASSES && error > CRM_PASS_TOL * first; k++) {
+        crm_scatter(w, a->point, f->trial);
+        memset(f->dot.u, 0, (size_t)n * sizeof(double));
+        crm_seen_jvp(f, s, c, f->trial);
+        e = crm_push_jvp(f, f->trial);
+        if (e < 0) return e;
+        crm_gather(w, f->trial, a->value);
+        error = 0;
+        for (int i = 0; i < n; i++) {
+            a->value[i] += f->rest[3 * w->island->bodies[i / 3] + i % 3];
+            error = fmax(error, fabs(a->value[i] - a->point[i]));
+        }
+        if (!(error < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
+        crm_anderson_next(a);
+    }
+    crm_scatter(w, a->point, x);
+    return error <= CRM_PASS_LOOSE * first ? CAROM_OK : CAROM_E_NO_SOLUTION;
+}
+
 /* c_n of a contact that has opened, gap / h. */
 static carom_status stage_2_jvp(crm_forward *f, crm_substep *s, int n)
 {
@@ -179,7 +211,8 @@ static carom_status stage_2_jvp(crm_forward *f, crm_substep *s, int n)
         for (int k = 0; k < s->n_contacts; k++) {
             if (c->cn[k] != 0) f->dot.cn[k] = (f->gap[k] - c->cn[k] * line->h) / s->h;
         }
-        const carom_status e = crm_solve_jvp(f, line->v);
+        carom_status e = crm_solve_jvp(f, line->v);
+        if (e >= 0 && crm_sees_speed(f->world)) e = close_seen(f, s, c, line->v);
         if (e < 0) return e;
     }
     return CAROM_OK;

@@ -390,6 +390,7 @@ carom_status crm_locate_change(carom_world *w, double left)
     if (!w->plan.changes || s->map == CRM_MAP_EULER || s->map == CRM_MAP_IMPACT) return CAROM_OK;
     if (!s->n_contacts || s->ahead || recovers(w, s)) return CAROM_OK;
     if (s->n_contacts > MAX_CONTACTS || !seeks(w)) return CAROM_OK;
+    if (w->n_fields) return CAROM_OK; /* fields are not among its forces */
     const int opens = is_mixed(s) || lets_go(w, s);
     int any = 0;
     if (!opens && !may_change(w, s)) return CAROM_OK;

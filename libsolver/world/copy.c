@@ -66,6 +66,11 @@ static carom_status copy_joints(carom_world *w, const carom_world *from)
                   sizeof *w->excluded);
     w->excluded = excluded;
     if (e) return e;
+    void *fields = NULL;
+    e = copy_list(w, &fields, &w->max_fields, from->fields, from->n_fields, sizeof *w->fields);
+    w->fields = fields;
+    if (e) return e;
+    w->n_fields = from->n_fields;
     w->n_joints = from->n_joints;
     w->n_joint_rows = from->n_joint_rows;
     w->n_breakable = from->n_breakable;

@@ -42,10 +42,10 @@ double crm_share(const crm_solve *c)
     }
 }
 
-/* Stage 2 begins at the middle of the sub-step: 2 vh - v0 is the velocity at its end. */
+/* Stage 2 ends the sub-step: with the velocity there it is the reverse of stage 1. */
 double crm_seen_velocity(const crm_substep *s, const crm_solve *c, int k)
 {
-    return c->kind == CRM_STAGE_2 ? 2 * c[-1].v[k] - s->v0[k] : s->v0[k];
+    return c->kind == CRM_STAGE_2 ? c->v[k] : s->v0[k];
 }
 
 /* J x for a world array x, and n J W J'. */
@@ -65,19 +65,19 @@ static double weight_of(const carom_world *w, const crm_joint *j, const double r
 }
 
 /* A stiffness is stable while h^2 k weight <= 4, a damping while h d weight <= 2: softened, they
- * stay at a half of that for h = dt, and differ from what is given by order dt^8 and dt^4.  A
+ * stay at a half of that for h = dt, and differ from what is given by order dt^16 and dt^8.  A
  * sub-step that is shorter has the same, or it would set free what a spring does not hold.
  * Counting springs in the weight keeps several on one body from adding up. */
 double crm_soften(double x, double times)
 {
     const double y = x * times;
-    return x / sqrt(sqrt(1 + y * y * y * y));
+    return y > 1 ? pow(1 + pow(y, -8), -0.125) / times : x * pow(1 + pow(y, 8), -0.125);
 }
 
 double crm_soften_slope(double x, double times)
 {
     const double y = x * times;
-    return pow(1 + y * y * y * y, -1.25);
+    return y > 1 ? pow(1 + pow(y, -8), -1.125) * pow(y, -9) : pow(1 + pow(y, 8), -1.125);
 }
 
 crm_push crm_spring_push(const carom_world *w, const crm_substep *s, const crm_solve *c,
@@ -90,7 +90,7 @@ crm_push crm_spring_push(const carom_world *w, const crm_substep *s, const crm_s
     p.share = crm_share(c);
     p.way = crm_measure_at(j, m, c->q, p.row) - lever * j->rest;
     p.speed = 0;
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; j->damping > 0 && i < 6; i++) {
         const int body = i < 3 ? j->body_a : j->body_b;
         p.speed += p.row[i] * crm_seen_velocity(s, c, 3 * body + i % 3);
     }

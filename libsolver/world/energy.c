@@ -41,7 +41,7 @@ static int is_passive(const carom_world *w, const crm_substep *s)
     for (int k = 0; k < w->island->n_bodies; k++) {
         if (w->bodies[w->island->bodies[k]].type != CAROM_DYNAMIC) return 0;
     }
-    return (!w->island->n_driven && !w->damped) || !(s->h > 0);
+    return (!w->island->n_driven && !w->damped && !w->n_fields) || !(s->h > 0);
 }
 
 /* v = u + W J'l with J v + c complementary to l has, for c >= 0,

@@ -28,7 +28,8 @@ static void exchange(carom_world *w, int inner)
 }
 
 /* Contacts, forces and guesses of inner sub-step i, which starts at (q, v). */
-static carom_status prepare(carom_world *w, int i, const double *q, const double *v, double h)
+static carom_status prepare(carom_world *w, int i, const double *q, const double *v, double h,
+                            double since)
 {
     const crm_substep *outer = &w->sub;
     crm_substep *s = &w->inner[i];
@@ -38,6 +39,7 @@ static carom_status prepare(carom_world *w, int i, const double *q, const double
     crm_copy(w, s->q0, q);
     crm_copy(w, s->v0, v);
     s->force = outer->force;
+    s->time = outer->time + since;
     s->n_contacts = outer->n_contacts;
     s->ahead = 0;
     s->keep = outer->keep;
@@ -51,9 +53,10 @@ static carom_status prepare(carom_world *w, int i, const double *q, const double
     return CAROM_OK;
 }
 
-static carom_status run_inner(carom_world *w, int i, const double *q, const double *v, double h)
+static carom_status run_inner(carom_world *w, int i, const double *q, const double *v, double h,
+                              double since)
 {
-    const carom_status e = prepare(w, i, q, v, h);
+    const carom_status e = prepare(w, i, q, v, h, since);
     if (e) return e;
     exchange(w, i);
     const carom_status s = crm_smooth(w, h);
@@ -68,7 +71,7 @@ static carom_status run_column(carom_world *w, int n, int first, double h)
     const double *v = w->sub.v0;
     carom_status worst = CAROM_OK;
     for (int j = first; j < first + n; j++) {
-        const carom_status e = run_inner(w, j, q, v, h / n);
+        const carom_status e = run_inner(w, j, q, v, h / n, (j - first) * h / n);
         if (e < 0) return e;
         if (e > worst) worst = e;
         q = w->inner[j].q1;

@@ -184,9 +184,9 @@ typedef struct crm_push {
 } crm_push;
 /* Share of h of a solve: 1, 1/2 of a stage, 0 where no time passes. */
 double crm_share(const crm_solve *c);
-/* Velocity of a body before a solve, as its springs see it. */
+/* Velocity of a body, as its springs see it in a solve: before it, in stage 2 after it. */
 double crm_seen_velocity(const crm_substep *s, const crm_solve *c, int k);
-/* x (1 + (x times)^4)^(-1/4), which is never above 1 / times, and its derivative by x. */
+/* x (1 + (x times)^8)^(-1/8), which is never above 1 / times, and its derivative by x. */
 double crm_soften(double x, double times);
 double crm_soften_slope(double x, double times);
 crm_push crm_spring_push(const carom_world *w, const crm_substep *s, const crm_solve *c,
@@ -312,6 +312,8 @@ carom_contact_problem crm_hold_problem(carom_world *w, const crm_substep *s, con
 /* The maps: from (q0, v0) of w->sub to (q1, v1). */
 carom_status crm_euler(carom_world *w, double h);  /* euler.c */
 carom_status crm_smooth(carom_world *w, double h); /* smooth.c */
+/* smooth.c: whether forces on the island depend on velocities that stage 2 is to find. */
+int crm_sees_speed(const carom_world *w);
 /* smooth.c; plastic: without restitution, CAROM_LIMIT. */
 carom_status crm_impact(carom_world *w, int plastic);
 /* The map of the sub-step under way, sub.map, over h; sub.met is its status. */
@@ -393,6 +395,21 @@ void crm_events_compare(carom_world *w, int n_before);
 
 /* A joint breaks; there is room for it. */
 void crm_events_break(carom_world *w, int joint);
+
+/* field.c: sums over all fields. */
+void crm_field_force(const carom_world *w, int body, double t, const double *q, const double *v,
+                     double f[3]);
+void crm_field_slopes(const carom_world *w, int body, double t, const double *q, const double *v,
+                      double by_q[9], double by_v[9]);
+int crm_fields_have_slopes(const carom_world *w);
+/* Time and velocities at which a solve takes them. */
+double crm_field_time(const crm_substep *s, const crm_solve *c);
+const double *crm_field_velocity(const crm_substep *s, const crm_solve *c);
+/* Their impulses to rows.u. */
+void crm_fields(carom_world *w, const crm_substep *s, const crm_solve *c);
+/* a += W f */
+void crm_field_acceleration(const carom_world *w, int body, double t, const double *q,
+                            const double *v, double a[3]);
 
 /* break.c */
 int crm_joint_breaks(const crm_joint *j);

@@ -55,6 +55,7 @@ static void foresee(carom_world *w, int b, double dt)
     double a[3];
     double *d = &s->ahead[3 * b];
     crm_free_acceleration(w, b, NULL, a);
+    if (w->n_fields) crm_field_acceleration(w, b, carom_world_time(w), w->q, w->v, a);
     for (int k = 0; k < 3; k++) {
         const double step = dt * w->v[3 * b + k];
         const double fall = dt * dt * a[k];

@@ -93,12 +93,13 @@ carom_plan crm_plan(const carom_world *w)
     read_materials(w, &p);
     read_joints(w, &p);
     p.damping = crm_world_is_damped(w);
+    p.fields = w->n_fields > 0;
     p.solver = p.contacts || w->n_joint_rows > 0 || p.limits;
     p.located = (p.contacts || p.limits) && w->settings.integrator != CAROM_FIXED;
     p.changes = (p.contacts || p.limits) && w->settings.integrator == CAROM_LOCATED &&
                 (w->settings.order > 2 || w->settings.events == CAROM_EVENTS_ALL);
-    p.extrapolated =
-        (p.solver || p.damping) && w->settings.order > 2 && w->settings.integrator == CAROM_LOCATED;
+    p.extrapolated = (p.solver || p.damping || p.fields) && w->settings.order > 2 &&
+                     w->settings.integrator == CAROM_LOCATED;
     p.threads = w->settings.threads > 1;
     return p;
 }

@@ -220,6 +220,7 @@ void crm_solve_velocity(carom_world *w, const crm_substep *s, const crm_solve *c
         damp_masses(w, h);
     }
     free_velocity(w, s, c->kind == CRM_STAGE_2 ? c[-1].v : s->v0, h);
+    if (w->n_fields) crm_fields(w, s, c);
     if (!w->island->n_driven || !(crm_share(c) > 0)) return;
     crm_springs(w, s, c);
     crm_motors(w, s, c);

@@ -142,7 +142,7 @@ static int rests(const carom_world *w)
 {
     const crm_island *i = w->island;
     const double slow = CRM_REST_TOL * w->speed;
-    if (w->stats->status != CAROM_OK || i->n_limited || i->n_driven) return 0;
+    if (w->stats->status != CAROM_OK || i->n_limited || i->n_driven || w->n_fields) return 0;
     for (int k = 0; k < i->n_bodies; k++) {
         if (!barely_moves(w, i->bodies[k], slow)) return 0;
     }

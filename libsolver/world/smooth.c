@@ -204,6 +204,65 @@ static carom_status stage_1(carom_world *w, crm_substep *s)
     return e < 0 ? e : iterate(w, s, c);
 }
 
+/* Whether forces on the island depend on velocities that stage 2 is to find. */
+int crm_sees_speed(const carom_world *w)
+{
+    for (int k = 0; w->island->n_driven && k < w->island->n_joints; k++) {
+        if (w->joints[w->island->joints[k]].damping > 0) return 1;
+    }
+    return w->n_fields > 0;
+}
+
+/* Largest speed of a point of a body between two velocities [m/s]. */
+static double change_of_speed(const carom_world *w, const double *packed, const double *v)
+{
+    double top = 0;
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int b = w->island->bodies[i];
+        const double *x = packed + 3 * i;
+        const double *y = v + 3 * b;
+        top = fmax(top, hypot(x[1] - y[1], x[2] - y[2]) + fabs(x[0] - y[0]) * w->length);
+    }
+    return top;
+}
+
+static void pack_speed(const carom_world *w, const double *v, double *x)
+{
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        memcpy(&x[3 * i], &v[3 * w->island->bodies[i]], 3 * sizeof *x);
+    }
+}
+
+static void take_speed(const carom_world *w, const double *x, double *v)
+{
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        memcpy(&v[3 * w->island->bodies[i]], &x[3 * i], 3 * sizeof *v);
+    }
+}
+
+/* v1 = vh + h/2 W f(q1, v1) + W J1'l: forces at the velocity of one iteration give the next. */
+static carom_status iterate_speed(carom_world *w, crm_substep *s, crm_solve *c)
+{
+    crm_anderson *a = &w->anderson;
+    carom_status e = crm_anderson_start(&w->memory, a, 3 * w->island->n_bodies);
+    if (e < 0) return e;
+    pack_speed(w, c->v, a->point);
+    for (int k = 0; k < MAX_NEWTON && w->effort < CRM_WORN; k++) {
+        e = crm_solve_run(w, s, c, 1);
+        if (e < 0) return e;
+        const double scale = crm_top_speed(w, c->v) + w->speed;
+        const double moved = change_of_speed(w, a->point, c->v);
+        if (moved <= NEWTON_TOL * scale) return e;
+        if (k >= PATIENT && moved <= LOOSE * scale) return CAROM_INEXACT;
+        if (!(moved < HUGE_VAL)) return CAROM_E_NO_SOLUTION;
+        pack_speed(w, c->v, a->value);
+        crm_anderson_next(a);
+        take_speed(w, a->point, c->v);
+        crm_solve_velocity(w, s, c);
+    }
+    return CAROM_E_NO_SOLUTION;
+}
+
 /* Stage 2 at q1: M v1 = M vh + h/2 f + J1' l with the contacts still closed and the joints at rest;
  * a contact that has opened may close no faster than gap / h. */
 static carom_status stage_2(carom_world *w, crm_substep *s)
@@ -214,6 +273,12 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
     c->kind = CRM_STAGE_2;
     crm_copy(w, c->q, s->q1);
     crm_rows_at(w, s, s->q1);
+    const int sees = crm_sees_speed(w);
+    if (sees) {
+        crm_copy(w, c->v, s->v0);
+        crm_move(w, c->v, s->v0, -2);
+        crm_move(w, c->v, last->v, 2);
+    }
     crm_solve_start(w, s, c);
     for (int k = 0; k < s->n_contacts; k++) {
         c->cn[k] = s->moved[k].gap > slop ? s->moved[k].gap / s->h : 0;
@@ -222,10 +287,10 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
     }
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
     crm_motor_sides(w, c);
-    const carom_status e = crm_solve_run(w, s, c, 1);
+    const carom_status e = sees ? iterate_speed(w, s, c) : crm_solve_run(w, s, c, 1);
     if (e < 0) return e;
     crm_copy(w, s->v1, c->v);
-    return CAROM_OK;
+    return sees ? e : CAROM_OK;
 }
 
 /* Overlap and joint errors beyond the margin at q1, which events that nobody located and sub-steps
@@ -301,6 +366,7 @@ static int gains_energy(const carom_world *w, const crm_substep *s, const double
     double a[3];
     double push = 0;
     double mass = 0;
+    if (w->n_fields) return 0;
     for (int k = 0; k < w->island->n_bodies; k++) {
         const int b = w->island->bodies[k];
         if (w->bodies[b].type != CAROM_DYNAMIC) return 0;

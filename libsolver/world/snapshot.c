@@ -82,6 +82,7 @@ static void hash_joints(crm_coder *c, const carom_world *w)
                                   j->break_torque};
         for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) hash_number(c, numbers[i]);
     }
+    hash_whole(c, w->n_fields);
     hash_whole(c, w->n_excluded);
     for (int k = 0; k < w->n_excluded; k++) {
         hash_whole(c, w->excluded[k].a);

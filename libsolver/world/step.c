@@ -172,6 +172,7 @@ static carom_status run_stable(carom_world *w, double left, int last, double *sp
 static carom_status substep(carom_world *w, double *left, int last)
 {
     const double since = fmax(w->settings.dt - *left, 0);
+    w->sub.time = carom_world_time(w) + w->settings.dt - *left;
     double span;
     carom_status e = run_stable(w, *left, last, &span);
     if (e < 0) return e;

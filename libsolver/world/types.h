@@ -165,6 +165,7 @@ enum { CRM_MAX_COLUMNS = 4, CRM_MAX_INNER = 10, CRM_MAX_HOLDS = 4 };
 typedef struct crm_substep {
     crm_map map;
     double h;            /* [s], 0 for an impact */
+    double time;         /* at its start, since step 0 [s] */
     double *q0, *v0;     /* 3 n_bodies */
     double *q1, *v1;     /* 3 n_bodies */
     const double *force; /* 3 n_bodies: (torque, fx, fy) of the step */
@@ -317,6 +318,8 @@ struct carom_world {
     int n_breakable; /* joints */
     int n_joint_rows;
     crm_joint *joints;
+    int n_fields, max_fields;
+    carom_field *fields;
     int n_excluded, max_excluded;
     carom_pair *excluded; /* bodies, a < b, sorted */
 
@@ -357,8 +360,8 @@ struct carom_world {
     int n_stiff;              /* sub-steps of the island that ended for stiff joints alone */
     int n_parts;              /* into which stiff joints divide its frame; 0: not known yet */
     int effort;               /* factorizations of the island in this frame */
-    crm_rest *rest;      /* per body; NULL: nothing sleeps */
-    double *rest_forces; /* three per joint row: of the joints before the step */
+    crm_rest *rest;           /* per body; NULL: nothing sleeps */
+    double *rest_forces;      /* three per joint row: of the joints before the step */
     crm_touches touches, next;
     int first_touch;        /* of the island, in next */
     double *joint_force[2]; /* per joint row: as crm_touch.force_n [N] */

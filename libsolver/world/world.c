@@ -79,6 +79,7 @@ static void free_built(carom_world *w)
     crm_free(m, w->shapes, (size_t)w->max_shapes, sizeof *w->shapes);
     crm_free(m, w->vertices, (size_t)w->max_vertices, sizeof *w->vertices);
     crm_free(m, w->joints, (size_t)w->max_joints, sizeof *w->joints);
+    crm_free(m, w->fields, (size_t)w->max_fields, sizeof *w->fields);
     crm_free(m, w->excluded, (size_t)w->max_excluded, sizeof *w->excluded);
 }
 

@@ -194,6 +194,24 @@ CAROM_API carom_status carom_world_add_revolute(carom_world *world, int body_a, 
  * CAROM_E_MEMORY; CAROM_E_STATE after the first step. */
 CAROM_API carom_status carom_world_exclude(carom_world *world, int body_a, int body_b);
 
+/* A force that the caller computes, on every dynamic body, as a function of that body's own state
+ * and the time since step 0.  It must be finite and always the same for the same arguments: it is
+ * called twice or more for each body in each sub-step, for sub-steps that are tried and thrown
+ * away too, and with the setting `threads` from several threads at once.  It must not call the
+ * world. */
+typedef struct carom_field {
+    /* f: (torque, fx, fy), zero before the call. */
+    void (*force)(void *user, int body, double t, const double q[3], const double v[3],
+                  double f[3]);
+    /* by_q[3 i + j] = d f_i / d q_j, by_v likewise; zero before the call.  NULL: gradients and
+     * tangents of runs with it are refused.  Only for forces that do not depend on t. */
+    void (*derivative)(void *user, int body, double t, const double q[3], const double v[3],
+                       double by_q[9], double by_v[9]);
+    void *user; /* the caller's; must outlive the world and its copies */
+} carom_field;
+/* CAROM_E_ARGUMENT without force, CAROM_E_MEMORY, CAROM_E_STATE once sealed. */
+CAROM_API carom_status carom_world_add_field(carom_world *world, const carom_field *field);
+
 /* Optional last call of building: freezes the scales L and g, checks the scene, projects or refuses
  * initial overlap, allocates.  The first step does it when the caller did not. */
 CAROM_API carom_status carom_world_seal(carom_world *world);
@@ -281,6 +299,7 @@ typedef struct carom_plan {
     int limits;       /* of joints: contacts without shapes */
     int drives;       /* springs and motors */
     int damping;      /* of bodies */
+    int fields;       /* forces that the caller computes */
     int solver;       /* contact problems are solved: contacts, joint rows or limits */
     int located;      /* times of impacts are sought */
     int changes;      /* ... and those at which contacts open or begin to slip */

@@ -1,0 +1,315 @@
+/* Forces that the caller computes: closed forms, orders, gradients. */
+#include "carom/grad.h"
+#include "near.h"
+#include "scenes.h"
+
+#include <string.h>
+
+typedef struct law {
+    double k; /* strength */
+    double d;
+} law;
+
+/* m a = -k x - d v of a disc of mass 2 */
+static void spring(void *user, int body, double t, const double q[3], const double v[3],
+                   double f[3])
+{
+    const law *a = user;
+    (void)body;
+    (void)t;
+    for (int i = 0; i < 3; i++) f[i] = -a->k * q[i] - a->d * v[i];
+}
+
+static void spring_slopes(void *user, int body, double t, const double q[3], const double v[3],
+                          double by_q[9], double by_v[9])
+{
+    const law *a = user;
+    (void)body;
+    (void)t;
+    (void)q;
+    (void)v;
+    for (int i = 0; i < 3; i++) by_q[4 * i] = -a->k, by_v[4 * i] = -a->d;
+}
+
+/* -k x / |x|^3 */
+static void center(void *user, int body, double t, const double q[3], const double v[3],
+                   double f[3])
+{
+    const law *a = user;
+    const double r = hypot(q[1], q[2]);
+    (void)body;
+    (void)t;
+    (void)v;
+    f[1] = -a->k * q[1] / (r * r * r);
+    f[2] = -a->k * q[2] / (r * r * r);
+}
+
+/* k |v| v against the motion. */
+static void air(void *user, int body, double t, const double q[3], const double v[3], double f[3])
+{
+    const law *a = user;
+    const double speed = hypot(v[1], v[2]);
+    (void)body;
+    (void)t;
+    (void)q;
+    f[1] = -a->k * speed * v[1];
+    f[2] = -a->k * speed * v[2];
+}
+
+static void air_slopes(void *user, int body, double t, const double q[3], const double v[3],
+                       double by_q[9], double by_v[9])
+{
+    const law *a = user;
+    const double speed = hypot(v[1], v[2]);
+    (void)body;
+    (void)t;
+    (void)q;
+    (void)by_q;
+    for (int i = 1; speed > 0 && i < 3; i++) {
+        for (int j = 1; j < 3; j++) {
+            by_v[3 * i + j] = -a->k * (v[i] * v[j] / speed + (i == j ? speed : 0));
+        }
+    }
+}
+
+/* A charge in a magnetic field turns with k / m and keeps its speed. */
+static void magnet(void *user, int body, double t, const double q[3], const double v[3],
+                   double f[3])
+{
+    const law *a = user;
+    (void)body;
+    (void)t;
+    (void)q;
+    f[1] = a->k * v[2];
+    f[2] = -a->k * v[1];
+}
+
+static void tide(void *user, int body, double t, const double q[3], const double v[3], double f[3])
+{
+    const law *a = user;
+    (void)body;
+    (void)q;
+    (void)v;
+    f[1] = a->k * cos(3 * t);
+}
+
+static carom_world *flight(carom_field field, int order, int n, double x, double y, double vx,
+                           double vy)
+{
+    scene_order = order;
+    carom_world *w = scene_world(0, 1.0 / n);
+    scene_order = 2;
+    scene_push(w, scene_disc(w, 2, 1, x, y, 0, 0), 0, vx, vy);
+    assert_int_equal(carom_world_add_field(w, &field), CAROM_OK);
+    return w;
+}
+
+typedef struct form {
+    const char *name;
+    void (*force)(void *, int, double, const double *, const double *, double *);
+    law law;
+    double start[4];
+    double end[2]; /* after 1 s */
+} form;
+
+static double error_of(const form *f, int order, int n)
+{
+    law a = f->law;
+    const carom_field field = {f->force, NULL, &a};
+    carom_world *w = flight(field, order, n, f->start[0], f->start[1], f->start[2], f->start[3]);
+    scene_run(w, n, NULL);
+    const double *q = carom_world_q(w);
+    const double error = hypot(q[1] - f->end[0], q[2] - f->end[1]);
+    carom_world_destroy(w);
+    return error;
+}
+
+static void orders_are_kept(void **state)
+{
+    (void)state;
+    const double s = sqrt(25 - 1.5 * 1.5); /* k/m = 25, d/m = 3 */
+    const double swing = exp(-1.5) * (cos(s) + 1.5 / s * sin(s));
+    const form forms[] = {
+        {"oscillator", spring, {50, 6}, {1, 0, 0, 0}, {swing, 0}},
+        /* circle of radius 1: omega^2 = k/m = 4 */
+        {"orbit", center, {8, 0}, {1, 0, 0, 2}, {cos(2), sin(2)}},
+        /* v' = -k/m v^2: x = log(1 + k/m v0 t) m/k */
+        {"air", air, {1, 0}, {0, 0, 3, 0}, {2 * log(1 + 1.5), 0}},
+        {"magnet", magnet, {6, 0}, {0, 0, 1.5, 0}, {0.5 * sin(3), 0.5 * (cos(3) - 1)}},
+        /* x'' = k/m cos 3t */
+        {"tide", tide, {4, 0}, {0, 0, 0, 0}, {2 * (1 - cos(3)) / 9, 0}},
+    };
+    scene_integrator = CAROM_LOCATED;
+    for (size_t k = 0; k < sizeof forms / sizeof forms[0]; k++) {
+        for (int order = 2; order <= 6; order += 2) {
+            const int n = order < 6 ? 40 : 20;
+            const double coarse = error_of(&forms[k], order, n);
+            const double fine = error_of(&forms[k], order, 2 * n);
+            assert_near_case(forms[k].name, order, log2(coarse / fine), order, 0.4);
+        }
+    }
+}
+
+/* The symmetric map turns velocities in a magnetic field: no speed is lost in 1000 steps. */
+static void magnet_keeps_speed(void **state)
+{
+    (void)state;
+    law a = {6, 0};
+    const carom_field field = {magnet, NULL, &a};
+    scene_integrator = CAROM_LOCATED;
+    carom_world *w = flight(field, 2, 60, 0, 0, 1.5, 0);
+    scene_run(w, 1000, NULL);
+    const double *v = carom_world_v(w);
+    assert_near(hypot(v[1], v[2]), 1.5, 1e-11); /* 1000 fixed points to 1e-14 */
+    carom_world_destroy(w);
+}
+
+/* Linear drag as a force is the same as as damping, but for the order of the map. */
+static void strong_drag_holds(void **state)
+{
+    (void)state;
+    law a = {0, 200}; /* h d / m = 1.7 */
+    const carom_field field = {spring, NULL, &a};
+    scene_integrator = CAROM_LOCATED;
+    carom_world *w = flight(field, 2, 60, 0, 0, 1, 0);
+    scene_run(w, 60, NULL);
+    assert_near(carom_world_v(w)[1], 0, 1e-13); /* ((1 - .83)/(1 + .83))^60 = 1e-63 */
+    carom_world_destroy(w);
+}
+
+/* A pendulum in air over a floor, which a ball in air hits. */
+static carom_world *parts(carom_field field, carom_integrator integrator, int order)
+{
+    scene_integrator = integrator;
+    scene_order = order;
+    carom_world *w = scene_world(9.81, 1.0 / 60);
+    scene_order = 2;
+    const carom_vec2 pin = {0, 0};
+    const carom_pose pose = {0, 0.5, 0};
+    const int floor = scene_floor(w, 0.4, 0.5);
+    const int bar = scene_box(w, 1, 0.5, 0.05, pose, 0, 0.5);
+    const int ball = scene_disc(w, 0.7, 0.2, 2, 0.45, 0.4, 0.5);
+    assert_int_equal(carom_world_exclude(w, floor, bar), CAROM_OK);
+    assert_int_equal(carom_world_add_revolute(w, floor, bar, pin, NULL), CAROM_OK);
+    assert_int_equal(carom_world_add_field(w, &field), CAROM_OK);
+    scene_push(w, ball, 1, 2, -1);
+    return w;
+}
+
+static double end_of(double vx, double k, carom_integrator integrator, int order, double *by_vx,
+                     double *forward)
+{
+    law a = {k, 0};
+    const carom_field field = {air, air_slopes, &a};
+    carom_world *w = parts(field, integrator, order);
+    carom_tape *tape;
+    const double weight[9] = {0, 0, 0, 1, 0.3, 0.2, 0.1, 1, -0.5};
+    double v0[9] = {0};
+    double q_dot[9];
+    double v_dot[9];
+    carom_gradient g = {0};
+    carom_gradient along = {0};
+    double sum = 0;
+    scene_push(w, 2, 1, vx, -1);
+    scene_push(w, 1, vx - 2, 0, 0);
+    assert_int_equal(carom_tape_create(w, NULL, &tape), CAROM_OK);
+    for (int i = 0; i < 30; i++) assert_true(carom_tape_step(tape, NULL, NULL) >= 0);
+    const carom_state_bar bar = {30, weight, weight};
+    const carom_state_dot dot = {30, q_dot, v_dot};
+    g.v0 = v0;
+    if (by_vx) {
+        const double ahead[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+        along.v0 = (double *)ahead;
+        assert_int_equal(carom_tape_gradient(tape, 1, &bar, &g, NULL), CAROM_OK);
+        assert_int_equal(carom_tape_tangent(tape, 1, &along, 1, &dot, NULL), CAROM_OK);
+        *by_vx = v0[3] + v0[7];
+        *forward = 0;
+        for (int i = 0; i < 9; i++) *forward += weight[i] * (q_dot[i] + v_dot[i]);
+    }
+    for (int i = 0; i < 9; i++) sum += weight[i] * (carom_world_q(w)[i] + carom_world_v(w)[i]);
+    carom_tape_destroy(tape);
+    carom_world_destroy(w);
+    return sum;
+}
+
+/* Through impacts, friction and a joint, with every map and order. */
+static void gradients_go_through(void **state)
+{
+    (void)state;
+    static const struct {
+        carom_integrator integrator;
+        int order;
+    } maps[] = {{CAROM_EULER, 2}, {CAROM_FIXED, 2}, {CAROM_LOCATED, 2}, {CAROM_LOCATED, 4}};
+    const double step = 1e-5; /* rounding 1e-16 / step, curvature step^2 */
+    for (int k = 0; k < 4; k++) {
+        double reverse;
+        double forward;
+        const carom_integrator m = maps[k].integrator;
+        end_of(2, 0.8, m, maps[k].order, &reverse, &forward);
+        const double difference = (end_of(2 + step, 0.8, m, maps[k].order, NULL, NULL) -
+                                   end_of(2 - step, 0.8, m, maps[k].order, NULL, NULL)) /
+                                  (2 * step);
+        assert_near_case("reverse", k, reverse, difference, 1e-7);
+        assert_near_case("forward", k, forward, reverse, 1e-10);
+    }
+}
+
+/* d x(1) / d x(0) of the oscillator is x(1) itself, its motion being linear. */
+static void gradient_of_the_oscillator(void **state)
+{
+    (void)state;
+    law a = {50, 6};
+    const carom_field field = {spring, spring_slopes, &a};
+    scene_integrator = CAROM_LOCATED;
+    for (int order = 2; order <= 6; order += 2) {
+        carom_world *w = flight(field, order, 60, 1, 0, 0, 0);
+        carom_tape *tape;
+        const double weight[3] = {0, 1, 0};
+        double q0[3];
+        carom_gradient g = {0};
+        g.q0 = q0;
+        assert_int_equal(carom_tape_create(w, NULL, &tape), CAROM_OK);
+        for (int i = 0; i < 60; i++) assert_true(carom_tape_step(tape, NULL, NULL) >= 0);
+        const carom_state_bar bar = {60, weight, NULL};
+        assert_int_equal(carom_tape_gradient(tape, 1, &bar, &g, NULL), CAROM_OK);
+        assert_near_case("by x", order, q0[1], carom_world_q(w)[1], 1e-12);
+        assert_near_case("by y", order, q0[2], 0, 1e-12);
+        carom_tape_destroy(tape);
+        carom_world_destroy(w);
+    }
+}
+
+static void refused(void **state)
+{
+    (void)state;
+    law a = {1, 0};
+    const carom_field field = {air, NULL, &a};
+    const carom_field empty = {NULL, air_slopes, &a};
+    carom_tape *tape;
+    double q0[3];
+    carom_gradient g = {0};
+    g.q0 = q0;
+    carom_world *w = flight(field, 2, 60, 0, 0, 1, 0);
+    assert_int_equal(carom_world_add_field(w, &empty), CAROM_E_ARGUMENT);
+    assert_int_equal(carom_world_add_field(w, NULL), CAROM_E_ARGUMENT);
+    assert_int_equal(carom_tape_create(w, NULL, &tape), CAROM_OK);
+    assert_int_equal(carom_tape_step(tape, NULL, NULL), CAROM_OK);
+    assert_int_equal(carom_tape_gradient(tape, 0, NULL, &g, NULL), CAROM_E_STATE);
+    assert_non_null(strstr(carom_world_error(w), "a field has no derivative"));
+    assert_int_equal(carom_world_add_field(w, &field), CAROM_E_STATE);
+    carom_tape_destroy(tape);
+    carom_world_destroy(w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(orders_are_kept),
+        cmocka_unit_test(magnet_keeps_speed),
+        cmocka_unit_test(strong_drag_holds),
+        cmocka_unit_test(gradients_go_through),
+        cmocka_unit_test(gradient_of_the_oscillator),
+        cmocka_unit_test(refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
