@@ -59,7 +59,7 @@ static void add_to(double *array, int joint, double x)
 /* - d crm_soften(x, t) / dt */
 static double by_times(double x, double t)
 {
-    return x * x * pow(x * t, 7) * crm_soften_slope(x, t);
+    return pow(x, 5) * t * t * t * crm_soften_slope(x, t);
 }
 
 /* One spring: force = -(k way + d speed) with k, d softened by h and weight. */

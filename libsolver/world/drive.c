@@ -65,19 +65,19 @@ static double weight_of(const carom_world *w, const crm_joint *j, const double r
 }
 
 /* A stiffness is stable while h^2 k weight <= 4, a damping while h d weight <= 2: softened, they
- * stay at a half of that for h = dt, and differ from what is given by order dt^16 and dt^8.  A
+ * stay at a half of that for h = dt, and differ from what is given by order dt^8 and dt^4.  A
  * sub-step that is shorter has the same, or it would set free what a spring does not hold.
  * Counting springs in the weight keeps several on one body from adding up. */
 double crm_soften(double x, double times)
 {
     const double y = x * times;
-    return y > 1 ? pow(1 + pow(y, -8), -0.125) / times : x * pow(1 + pow(y, 8), -0.125);
+    return x / sqrt(sqrt(1 + y * y * y * y));
 }
 
 double crm_soften_slope(double x, double times)
 {
     const double y = x * times;
-    return y > 1 ? pow(1 + pow(y, -8), -1.125) * pow(y, -9) : pow(1 + pow(y, 8), -1.125);
+    return pow(1 + y * y * y * y, -1.25);
 }
 
 crm_push crm_spring_push(const carom_world *w, const crm_substep *s, const crm_solve *c,

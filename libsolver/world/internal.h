@@ -186,7 +186,7 @@ typedef struct crm_push {
 double crm_share(const crm_solve *c);
 /* Velocity of a body, as its springs see it in a solve: before it, in stage 2 after it. */
 double crm_seen_velocity(const crm_substep *s, const crm_solve *c, int k);
-/* x (1 + (x times)^8)^(-1/8), which is never above 1 / times, and its derivative by x. */
+/* x (1 + (x times)^4)^(-1/4), which is never above 1 / times, and its derivative by x. */
 double crm_soften(double x, double times);
 double crm_soften_slope(double x, double times);
 crm_push crm_spring_push(const carom_world *w, const crm_substep *s, const crm_solve *c,

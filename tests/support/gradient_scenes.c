@@ -381,7 +381,6 @@ const gradient_scene gradient_joint_scenes[] = {
     {"motor of a hinge at its limit", two_joined, 20, 2e-5, 23},
     {"motor of a slider that holds", two_joined, 20, 2e-5, 24},
     {"motor of a slider at its limit", two_joined, 20, 2e-5, 25},
-    /* its spring is softened, by an eighth power: a shorter step */
-    {"car wheel", two_joined, 20, 2e-6, 26},
+    {"car wheel", two_joined, 20, 2e-5, 26},
 };
 const int n_gradient_joint_scenes = sizeof gradient_joint_scenes / sizeof gradient_joint_scenes[0];
