@@ -357,6 +357,8 @@ typedef struct crm_indicator {
 /* h in (0, *h] where it is zero: Illinois, then bisection.  Leaves sub evaluated at *h. */
 carom_status crm_find_root(carom_world *w, const crm_indicator *f, double *h);
 
+/* smooth.c: 1 where v1 of sub is faster than v0 and all forces can make it. */
+int crm_gains(const carom_world *w, const crm_substep *s);
 /* stop.c: when a contact of sub that slips at q0 does not slip to the end, the sub-step ends where
  * the first one stops. */
 carom_status crm_locate_stop(carom_world *w);

@@ -15,6 +15,8 @@ static const double LOOSE = 1e-9;
 static const double FAR = 1e2;
 /* Speeds beyond this are no error of second order but another solution [what forces can give]. */
 static const double GAIN = 1.5;
+/* From here on it is said: the step is long for what turns in it. */
+static const double GAIN_SAID = 1.1;
 
 /* Stage 1 aims at gap 0 and joint error 0; from farther off it goes there at no more than the
  * recovery speed, not at error / h, which in a short sub-step would be a kick.  Rows at q0. */
@@ -361,7 +363,7 @@ static int bounce_sides(carom_world *w, crm_substep *s, crm_solve *c)
 /* What holds at rest does no work: |v| <= |v0| + h |W f + g| in the mass metric,
  * with f also of springs and motors.  Far beyond that
  * a sub-step has turned joints so far that Newton's method found another of their poses. */
-static int gains_energy(const carom_world *w, const crm_substep *s, const double *v)
+static double gain_of(const carom_world *w, const crm_substep *s, const double *v)
 {
     double a[3];
     double push = 0;
@@ -376,7 +378,12 @@ static int gains_energy(const carom_world *w, const crm_substep *s, const double
     }
     const double most = crm_mass_speed(w, s->v0) + s->h * sqrt(push) + w->recovery * sqrt(mass) +
                         crm_drive_gain(w, s);
-    return crm_mass_speed(w, v) > GAIN * most;
+    return most > 0 ? crm_mass_speed(w, v) / most : 0;
+}
+
+int crm_gains(const carom_world *w, const crm_substep *s)
+{
+    return gain_of(w, s, s->v1) > GAIN_SAID;
 }
 
 /* 1: contacts are made to slip on, perhaps far beyond their stop, which friction drives there. */
@@ -434,8 +441,11 @@ carom_status crm_smooth(carom_world *w, double h)
     carom_status e = CAROM_OK;
     if (s->ahead) e = bounce(w, s, &done);
     if (e >= 0 && !done) e = stage_2(w, s);
-    if (e >= 0 && !done && !forced(s) && gains_energy(w, s, s->v1)) return CAROM_E_NO_SOLUTION;
-    return e < 0 ? e : worse(e, worse(met, cleared));
+    if (e < 0) return e;
+    const double gain = done || forced(s) ? 0 : gain_of(w, s, s->v1);
+    if (gain > GAIN) return CAROM_E_NO_SOLUTION;
+    if (gain > GAIN_SAID) e = worse(e, CAROM_INEXACT);
+    return worse(e, worse(met, cleared));
 }
 
 carom_status crm_impact(carom_world *w, int plastic)

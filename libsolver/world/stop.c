@@ -130,6 +130,8 @@ carom_status crm_locate_stop(carom_world *w)
     const crm_contact event = s->event;
     carom_status e = crm_map_run(w, h);
     if (e >= 0) e = find_stop(w);
+    /* friction that only slows gives nothing: what gains was made to slip against it */
+    if (e >= 0 && s->end == CRM_END_STOP && crm_gains(w, s)) e = CAROM_E_NO_SOLUTION;
     clear_slips(s);
     if (e == CAROM_E_MEMORY || (e >= 0 && s->end == CRM_END_STOP)) return e;
     s->end = end;
