@@ -110,6 +110,46 @@ static void same_bits(void **state)
     }
 }
 
+/* Stacks that sleep, and balls that wake some of them. */
+static carom_world *sleepers(int threads)
+{
+    carom_world_settings set = carom_world_defaults();
+    carom_world *w;
+    set.threads = threads;
+    set.sleep = 1;
+    assert_int_equal(carom_world_create(&set, NULL, &w), CAROM_OK);
+    scene_floor(w, 0.5, 0);
+    for (int s = 0; s < 9; s++) {
+        for (int k = 0; k < 12; k++) {
+            scene_box(w, 1, 0.5, 0.5, (carom_pose){0, 3.0 * s - 12, k + 0.5}, 0.5, 0);
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        scene_push(w, scene_disc(w, 3, 0.4, -15 - k, 6 + k, 0.5, 0.5), 0, 8 + k, 6);
+    }
+    return w;
+}
+
+static void sleep_is_the_same(void **state)
+{
+    (void)state;
+    carom_world *one = sleepers(1);
+    carom_world *many = sleepers(3);
+    int asleep = 0;
+    for (int k = 0; k < 2 * STEPS; k++) {
+        carom_step_stats a;
+        carom_step_stats b;
+        scene_run(one, 1, &a);
+        scene_run(many, 1, &b);
+        assert_same_state(one, many);
+        assert_int_equal(a.n_asleep, b.n_asleep);
+        if (a.n_asleep > asleep) asleep = a.n_asleep;
+    }
+    assert_true(asleep >= 12);
+    carom_world_destroy(one);
+    carom_world_destroy(many);
+}
+
 /* A tape is recorded by one thread, a snapshot of one number of threads is restored by another. */
 static void tapes_and_snapshots(void **state)
 {
@@ -179,6 +219,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(same_bits),
+        cmocka_unit_test(sleep_is_the_same),
         cmocka_unit_test(tapes_and_snapshots),
         cmocka_unit_test(memory),
         cmocka_unit_test(bad_numbers_are_refused),

@@ -142,6 +142,8 @@ static void explain_plan(FILE *f, const carom_plan *p)
              "no such times are sought");
     plan_row(f, "higher order", p->extrapolated, "sub-steps are extrapolated", "order 2, or 1");
     plan_row(f, "sensors", p->sensors, "seen by queries alone", "none");
+    plan_row(f, "sleep", p->sleep, "islands at rest are not run",
+             "all islands are run in each step");
     plan_row(f, "threads", p->threads, "islands are shared among threads", "one thread");
 }
 

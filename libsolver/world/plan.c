@@ -101,6 +101,7 @@ carom_plan crm_plan(const carom_world *w)
     p.extrapolated = (p.solver || p.damping || p.fields) && w->settings.order > 2 &&
                      w->settings.integrator == CAROM_LOCATED;
     p.threads = w->settings.threads > 1;
+    p.sleep = w->settings.sleep != 0;
     return p;
 }
 

@@ -306,6 +306,7 @@ typedef struct carom_plan {
     int extrapolated; /* orders above 2: tables of sub-steps */
     int sensors;      /* shapes that only carom_query_sensors sees */
     int threads;      /* islands are shared among several */
+    int sleep;        /* islands at rest are not run */
 } carom_plan;
 /* Of the scene as it is; friction and restitution follow the parameters. */
 CAROM_API carom_plan carom_world_plan(const carom_world *world);
