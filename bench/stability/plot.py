@@ -34,7 +34,7 @@ add 64 roundings of the largest coordinate."""
 COLOR_WORDS = """* **green**: all criteria hold, no status said anything.
 * **yellow**: all hold, and a positive status said that something was met with a caveat.
 * **red**: one does not hold, and a status said so; or the step was refused.
-* **black**: one does not hold, and every status was `CAROM_OK`; or the process crashed, or a step did not end.
+* **black**: one does not hold, and every status was `CAROM_OK`, or a single silent step gave that energy; or the process crashed, or a step did not end.
 * gray: the contender cannot run the scene (joints with limits and motors, polygons of more than 8 corners).
 
 Peers have no status: what fails is black."""

@@ -32,6 +32,8 @@ typedef struct running {
     double least_energy, most_kinetic, most_rise, most_lost; /* [J] */
     double most_turn;                                        /* [rad/s] */
     double first_energy, mass;
+    double last_energy, most_silent; /* largest rise in a step that said nothing [J] */
+    int said;                        /* status of the last step */
     outcome o;
 } running;
 
@@ -56,6 +58,7 @@ static void note(running *r, carom_status s)
 {
     outcome *o = &r->o;
     if (s > 0) o->n_said++;
+    r->said = (int)s;
     if (s < 0) say(o, carom_world_error(r->self));
     if (o->worst >= 0 && (s < 0 || (int)s > o->worst)) o->worst = (int)s;
 }
@@ -129,6 +132,8 @@ static void look_at_energy(running *r)
     r->most_rise = fmax(r->most_rise, energy - r->least_energy);
     r->least_energy = fmin(r->least_energy, energy);
     r->most_lost = fmax(r->most_lost, r->first_energy - energy);
+    if (!r->said) r->most_silent = fmax(r->most_silent, energy - r->last_energy);
+    r->last_energy = energy;
     for (int k = 0; k < r->t->s.n_bodies; k++) {
         if (r->t->s.bodies[k].moves != SCENE_DYNAMIC) continue;
         r->most_turn = fmax(r->most_turn, fabs(r->v[3 * k]));
@@ -188,7 +193,7 @@ static void steps(running *r, double limit)
     const double from = cpu_seconds();
     look(r);
     r->least_energy = HUGE_VAL;
-    r->first_energy = measure_energy(r->t, r->q, r->v);
+    r->first_energy = r->last_energy = measure_energy(r->t, r->q, r->v);
     r->mass = mass_of(&r->t->s);
     look_at_energy(r);
     for (int k = 0; k < n; k++) {
@@ -238,7 +243,9 @@ static void judge(running *r)
         say(o, carom_status_name((carom_status)o->worst));
         if (words[0]) snprintf(o->why, sizeof o->why, "%s", words);
     } else if (wrong) {
-        o->color = o->worst > 0 ? RED : BLACK;
+        /* what one step gave in silence others do not excuse */
+        const double silent = t->passive ? r->most_silent / energy_scale(r) : 0;
+        o->color = o->worst > 0 && silent <= gain_allowed(r) ? RED : BLACK;
     } else {
         o->color = o->worst > 0 ? YELLOW : GREEN;
     }
