@@ -5,6 +5,8 @@
 
 /* Time below this fraction of a step is carried into the next one. */
 static const double CARRY_TOL = 1e-13;
+/* Two shapes that together are no thicker are slivers [L]. */
+static const double SLIVER = 1e-2;
 /* Moving bodies times sub-steps of one frame, and sub-steps beyond all counting. */
 enum { BODY_SUBSTEPS = 128, MAX_SUBSTEPS = 256 };
 /* How often contacts are added that only the end of a sub-step shows. */
@@ -183,6 +185,24 @@ static carom_status substep(carom_world *w, double *left, int last)
     return !e && w->events.on ? crm_events_note(w, since) : e;
 }
 
+/* Slivers turn by more than their thickness within a sub-step, and may lie across each other at its
+ * end without a contact that was held: all that are near are looked at. */
+static void look_at_slivers(const carom_world *w)
+{
+    carom_step_stats *t = w->stats;
+    const double rounding = crm_rounding(w);
+    for (int k = 0; k < w->island->n_pairs; k++) {
+        const carom_pair pair = w->island->pairs[k];
+        const double thickness = w->shapes[pair.a].thickness + w->shapes[pair.b].thickness;
+        if (thickness > SLIVER * w->length || crm_far_apart(w, pair, w->q, 0)) continue;
+        const double overlap = -crm_collide(w, pair, w->q, HUGE_VAL).distance;
+        t->penetration = fmax(t->penetration, overlap);
+        if (overlap > crm_deep(w, pair, rounding) && t->status < CAROM_LIMIT) {
+            t->status = CAROM_LIMIT;
+        }
+    }
+}
+
 static void finish_island(carom_world *w, double left)
 {
     carom_step_stats *t = w->stats;
@@ -199,6 +219,7 @@ static void finish_island(carom_world *w, double left)
         t->penetration = fmax(t->penetration, -c.gap);
         t->n_contacts++;
     }
+    look_at_slivers(w);
     if (w->n_substeps > t->n_substeps) t->n_substeps = w->n_substeps;
 }
 
