@@ -172,18 +172,18 @@ typedef struct crm_substep {
     int degenerate;      /* weakly active or stick/slip borderline contacts */
     int n_contacts;
     int max_contacts;
-    crm_contact *contacts;   /* geometry at q0 */
-    crm_contact *moved;      /* the same contacts at the pose of the problem under way */
-    unsigned char *pressing; /* per contact: closed by force, so held at gap 0 from both sides */
-    signed char *slips;      /* per contact: the sign of the slip that it is made to keep, or 0 */
+    crm_contact *contacts;     /* geometry at q0 */
+    crm_contact *moved;        /* the same contacts at the pose of the problem under way */
+    unsigned char *pressing;   /* per contact: closed by force, so held at gap 0 from both sides */
+    signed char *slips;        /* per contact: the sign of the slip that it is made to keep, or 0 */
     const unsigned char *keep; /* per contact: the modes of both stages; NULL: they are found */
-    double *target;          /* per contact: gap that stage 1 aims at [m] */
-    double *joint_target;    /* per joint row: error that stage 1 aims at [m] */
-    double restitution;      /* factor on all restitutions: 1, or 0 when relaxed */
-    int slick;               /* 1: without friction, where that left no solution */
-    carom_status met;        /* of the map, when it was last run */
-    int ahead;               /* 1: contacts are all that may close; impacts are not located */
-    int n_inner;             /* of an extrapolated map: its smooth sub-steps */
+    double *target;            /* per contact: gap that stage 1 aims at [m] */
+    double *joint_target;      /* per joint row: error that stage 1 aims at [m] */
+    double restitution;        /* factor on all restitutions: 1, or 0 when relaxed */
+    int slick;                 /* 1: without friction, where that left no solution */
+    carom_status met;          /* of the map, when it was last run */
+    int ahead;                 /* 1: contacts are all that may close; impacts are not located */
+    int n_inner;               /* of an extrapolated map: its smooth sub-steps */
     double weight[CRM_MAX_COLUMNS]; /* ... of its columns */
     double estimate;                /* of its error [m] */
     int columns;                    /* ... in tolerance mode to be used; 0: to be chosen */

@@ -20,7 +20,8 @@ extern "C" {
     X(CAROM_OK, 0, "done")                                                                         \
     X(CAROM_INEXACT, 1, "solved to the relaxed tolerance only (residual <= 1e-6, not 1e-10)")      \
     X(CAROM_LIMIT, 2, "a limit on iterations or sub-steps was reached; the result is usable")      \
-    X(CAROM_RELAXED, 3, "restitution was relaxed: with it an impact has no solution or gives energy")    \
+    X(CAROM_RELAXED, 3,                                                                            \
+      "restitution was relaxed: with it an impact has no solution or gives energy")                \
     X(CAROM_E_ARGUMENT, -1, "an argument is out of its range, not finite or NULL")                 \
     X(CAROM_E_MEMORY, -2, "the allocator returned NULL")                                           \
     X(CAROM_E_CAPACITY, -3, "a capacity fixed by the caller is exceeded")                          \

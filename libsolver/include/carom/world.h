@@ -24,8 +24,8 @@ typedef enum carom_integrator {
     CAROM_FIXED    /* the same without location: one sub-step per step, for piles and real time */
 } carom_integrator;
 
-/* What `located` seeks within a step besides impacts; orders above 2 seek all, but with springs only
- * when told to. */
+/* What `located` seeks within a step besides impacts; orders above 2 seek all, but with springs
+ * only when told to. */
 typedef enum carom_events {
     CAROM_EVENTS_STOPS, /* slips that stop or reverse */
     CAROM_EVENTS_ALL    /* contacts that open or begin to slip, too */
