@@ -301,9 +301,46 @@ static void refused(void **state)
     carom_world_destroy(w);
 }
 
+static void breaks_down(void *user, int body, double t, const double q[3], const double v[3],
+                        double f[3])
+{
+    (void)user;
+    (void)body;
+    (void)q;
+    (void)v;
+    f[1] = t > 0.1 ? (double)NAN : 0;
+}
+
+/* A force that is no number: the step fails, names the body, and the world is as it was. */
+static void not_finite(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 6; k++) {
+        scene_integrator = (carom_integrator)(k % 3);
+        carom_world *w = scene_world(9.81, 1.0 / 60);
+        if (k >= 3) scene_floor(w, 0.5, 0);
+        const int b = scene_disc(w, 1, 0.5, 0, k < 3 ? 3 : 0.5, 0.5, 0.5);
+        const carom_field field = {.force = breaks_down};
+        assert_int_equal(carom_world_add_field(w, &field), CAROM_OK);
+        double before[3] = {0, 0, 0};
+        int n = 0;
+        while (n < 20 && carom_world_step(w, NULL, NULL) >= 0) {
+            memcpy(before, carom_world_q(w) + 3 * b, sizeof before);
+            n++;
+        }
+        assert_true(n >= 6 && n <= 7); /* t = 0.1 is the end of the sixth step */
+        assert_memory_equal(before, carom_world_q(w) + 3 * b, sizeof before);
+        assert_int_equal(carom_world_step(w, NULL, NULL), CAROM_E_ARGUMENT);
+        assert_true(strlen(carom_world_error(w)) > 0);
+        carom_world_destroy(w);
+    }
+    scene_integrator = CAROM_LOCATED;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(not_finite),
         cmocka_unit_test(orders_are_kept),
         cmocka_unit_test(magnet_keeps_speed),
         cmocka_unit_test(strong_drag_holds),

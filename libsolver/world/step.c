@@ -346,6 +346,31 @@ static carom_status take_forces(carom_world *w, const double *force)
     return CAROM_OK;
 }
 
+/* A body whose state a force field has made no number; -1: none. */
+static int lost_body(const carom_world *w)
+{
+    for (int k = 0; w->n_fields && k < 3 * w->n_bodies; k++) {
+        if (!isfinite(w->q[k]) || !isfinite(w->v[k])) return k / 3;
+    }
+    return -1;
+}
+
+/* The world as it was before the step, which ended with e. */
+static carom_status give_up(carom_world *w, carom_status e)
+{
+    const int lost = lost_body(w);
+    restore_state(w);
+    crm_forget_guesses(w);
+    w->events.n = 0;
+    if (lost >= 0) {
+        return crm_world_fail(w, CAROM_E_ARGUMENT,
+                              "step %ld: a field gave body %d a force that is not finite",
+                              w->n_steps + 1, lost);
+    }
+    return crm_world_fail(w, e, "step %ld, sub-step %d: %s", w->n_steps + 1, w->n_substeps + 1,
+                          carom_status_text(e));
+}
+
 static carom_status step(carom_world *w, const double *force)
 {
     carom_status e = crm_seal(w);
@@ -357,13 +382,7 @@ static carom_status step(carom_world *w, const double *force)
     carom_status full = e < 0 ? CAROM_OK : crm_touches_even(w);
     if (!full && e >= 0 && w->events.on) full = crm_events_reserve(w);
     if (full) e = full;
-    if (e < 0) {
-        restore_state(w);
-        crm_forget_guesses(w);
-        w->events.n = 0;
-        return crm_world_fail(w, e, "step %ld, sub-step %d: %s", w->n_steps + 1, w->n_substeps + 1,
-                              carom_status_text(e));
-    }
+    if (e < 0 || lost_body(w) >= 0) return give_up(w, e);
     const int n_before = w->touches.n;
     crm_touches_turn(w);
     if (w->events.on) crm_events_compare(w, n_before);
