@@ -164,7 +164,7 @@ static void status_comes_twice_a_second(void **state)
         const long size = peer_read(raw, 2, channel, data, sizeof data);
         assert_true(size > 0 && carom_status_t_decode(data, 0, (int)size, &s) == size);
         assert_string_equal(s.url, url);
-        assert_int_equal(s.num_clients, 1);
+        if (k > 0) assert_int_equal(s.num_clients, 1); /* the first may be older than this client */
         const double t = now();
         if (last > 0) assert_near(t - last, 0.5, 0.3); /* a loaded machine may be late */
         last = t;
