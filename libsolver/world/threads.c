@@ -150,8 +150,8 @@ static carom_status take_touches(carom_world *w, const outcome *o)
     return CAROM_OK;
 }
 
-/* In the order of islands, so that who took which leaves no trace. */
-static carom_status collect(carom_world *w, const outcome *o)
+/* From the first n workers, in the order of islands, so that who took which leaves no trace. */
+static carom_status collect(carom_world *w, const outcome *o, int n)
 {
     for (int i = 0; i < w->islands.n; i++, o++) {
         w->n_substeps = o->n_substeps;
@@ -164,7 +164,7 @@ static carom_status collect(carom_world *w, const outcome *o)
         }
         if (e) return e;
     }
-    for (int k = 0; k < w->n_workers; k++) {
+    for (int k = 0; k < n; k++) { /* others are of an earlier frame */
         w->islands.escaped |= w->workers[k].islands.escaped;
         w->islands.looked_ahead |= w->workers[k].islands.looked_ahead;
     }
@@ -232,7 +232,7 @@ carom_status crm_advance_shared(carom_world *w, int n, crm_advance *advance)
     job j = {.w = w, .advance = advance, .outcomes = w->outcomes};
     j.share = 1 + w->islands.n / (SHARES * n);
     e = run(w, &j, n);
-    return e ? e : collect(w, w->outcomes);
+    return e ? e : collect(w, w->outcomes, n);
 }
 
 void crm_threads_free(carom_world *w)
