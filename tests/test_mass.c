@@ -153,6 +153,23 @@ static void moments_of_the_outline(void **state)
     }
 }
 
+/* Two discs; and none. */
+static void moments_of_several(void **state)
+{
+    (void)state;
+    const carom_vec2 at[2] = {{-2, 0}, {3, 1}};
+    const carom_shape discs[2] = {{1, 1, &at[0]}, {0.5, 1, &at[1]}};
+    const carom_moments m = carom_shapes_moments(2, discs);
+    /* rounding of numbers up to 20 */
+    assert_near(m.area, PI * 1.25, 1e-14);
+    assert_near(m.centroid.x, (-2 + 0.25 * 3) / 1.25, 1e-14);
+    assert_near(m.centroid.y, 0.25 / 1.25, 1e-14);
+    assert_near(m.second, PI * (0.5 + 4 + 0.25 * (0.5 * 0.25 + 10)), 1e-13);
+    assert_near(m.extent, sqrt(10) + 0.5, 1e-14);
+    const carom_moments none = carom_shapes_moments(0, NULL);
+    assert_true(none.area == 0 && none.second == 0 && none.extent == 0);
+}
+
 /* Moving and turning a shape moves its centroid and changes nothing else; order does not matter. */
 static void mass_is_invariant(void **state)
 {
@@ -281,11 +298,9 @@ static void radius_derivative_at_zero(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(closed_forms),
-        cmocka_unit_test(moments_of_the_outline),
-        cmocka_unit_test(mass_is_invariant),
-        cmocka_unit_test(mass_derivatives),
-        cmocka_unit_test(radius_derivative_at_zero),
+        cmocka_unit_test(closed_forms),       cmocka_unit_test(moments_of_the_outline),
+        cmocka_unit_test(moments_of_several), cmocka_unit_test(mass_is_invariant),
+        cmocka_unit_test(mass_derivatives),   cmocka_unit_test(radius_derivative_at_zero),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -251,3 +251,25 @@ void carom_shape_mass_vjp(const carom_shape *shape, double density, carom_mass_p
     if (radius_bar) *radius_bar += r_bar;
     if (density_bar) *density_bar += bar.mass * m.s + bar.inertia * (m.j - crm_dot(c, m.f));
 }
+
+carom_moments carom_shapes_moments(int n, const carom_shape *shapes)
+{
+    carom_moments m = {0, {0, 0}, 0, 0};
+    for (int k = 0; k < n; k++) {
+        const carom_shape *s = &shapes[k];
+        const carom_mass_properties p = carom_shape_mass(s, 1);
+        const carom_vec2 c = p.centroid;
+        m.area += p.area;
+        m.centroid.x += p.area * c.x;
+        m.centroid.y += p.area * c.y;
+        m.second += p.inertia + p.area * (c.x * c.x + c.y * c.y); /* Steiner */
+        for (int i = 0; i < s->count; i++) {
+            m.extent = fmax(m.extent, hypot(s->vertices[i].x, s->vertices[i].y) + s->radius);
+        }
+    }
+    if (m.area > 0) {
+        m.centroid.x /= m.area;
+        m.centroid.y /= m.area;
+    }
+    return m;
+}

@@ -4,14 +4,6 @@
 /* A centroid this close to the position, relative to the extent, is rounding of the vertices. */
 #define CENTROID_TOL 1e-6
 
-/* Moments of the shapes of one body about its position, at density 1; overlaps count twice. */
-typedef struct moments {
-    double area;      /* [m^2] */
-    carom_vec2 first; /* int x dA [m^3] */
-    double second;    /* int |x|^2 dA [m^4] */
-    double extent;    /* largest distance of a surface point from the position, at most [m] */
-} moments;
-
 carom_body_def carom_body_at(carom_body_type type, double x, double y)
 {
     carom_body_def def = carom_body_defaults();
@@ -21,33 +13,15 @@ carom_body_def carom_body_at(carom_body_type type, double x, double y)
     return def;
 }
 
-static moments measure(const carom_body_def *def)
-{
-    moments m = {0, {0, 0}, 0, 0};
-    for (int k = 0; k < def->n_shapes; k++) {
-        const carom_shape *s = &def->shapes[k];
-        const carom_mass_properties p = carom_shape_mass(s, 1);
-        const carom_vec2 c = p.centroid;
-        m.area += p.area;
-        m.first.x += p.area * c.x;
-        m.first.y += p.area * c.y;
-        m.second += p.inertia + p.area * (c.x * c.x + c.y * c.y); /* Steiner */
-        for (int i = 0; i < s->count; i++) {
-            m.extent = fmax(m.extent, hypot(s->vertices[i].x, s->vertices[i].y) + s->radius);
-        }
-    }
-    return m;
-}
-
-static carom_status check_moments(carom_world *w, const moments *m)
+static carom_status check_moments(carom_world *w, const carom_moments *m)
 {
     const int id = w->n_bodies;
     if (!(m->area > 0)) {
         return crm_world_fail(w, CAROM_E_ARGUMENT,
                               "body %d: no area to take the mass from; give mass and inertia", id);
     }
-    const double x = m->first.x / m->area;
-    const double y = m->first.y / m->area;
+    const double x = m->centroid.x;
+    const double y = m->centroid.y;
     if (hypot(x, y) <= CENTROID_TOL * m->extent) return CAROM_OK;
     return crm_world_fail(w, CAROM_E_ARGUMENT,
                           "body %d: the centroid of its shapes is (%.9g, %.9g), not the position: "
@@ -77,7 +51,7 @@ carom_status carom_world_add_solid(carom_world *world, const carom_body_def *def
     solid.mass = 1;
     solid.inertia = 1;
     if (!are_valid(def)) return carom_world_add_body(world, &solid, index); /* names the shape */
-    const moments m = measure(def);
+    const carom_moments m = carom_shapes_moments(def->n_shapes, def->shapes);
     const carom_status e = check_moments(world, &m);
     if (e) return e;
     solid.mass = density * m.area;

@@ -6,26 +6,9 @@
  */
 #define CENTROID_TOL 1e-6
 
-crm_moments crm_body_moments(const carom_body_def *def)
+carom_moments crm_body_moments(const carom_body_def *def)
 {
-    crm_moments m = {0, {0, 0}, 0, 0};
-    for (int k = 0; k < def->n_shapes; k++) {
-        const carom_shape *s = &def->shapes[k];
-        const carom_mass_properties p = carom_shape_mass(s, 1);
-        const carom_vec2 c = p.centroid;
-        m.area += p.area;
-        m.centroid.x += p.area * c.x;
-        m.centroid.y += p.area * c.y;
-        m.second += p.inertia + p.area * (c.x * c.x + c.y * c.y); /* Steiner */
-        for (int i = 0; i < s->count; i++) {
-            m.extent = fmax(m.extent, hypot(s->vertices[i].x, s->vertices[i].y) + s->radius);
-        }
-    }
-    if (m.area > 0) {
-        m.centroid.x /= m.area;
-        m.centroid.y /= m.area;
-    }
-    return m;
+    return carom_shapes_moments(def->n_shapes, def->shapes);
 }
 
 static int is_lone_segment(const carom_body_def *def)
@@ -45,14 +28,14 @@ double crm_body_gyration(const carom_body_def *def)
         const carom_vec2 *v = def->shapes[0].vertices;
         return rod_gyration(v[0], v[1]);
     }
-    const crm_moments m = crm_body_moments(def);
+    const carom_moments m = crm_body_moments(def);
     return m.area > 0 ? m.second / m.area : 0;
 }
 
 void crm_body_follow(crm_scene_body *body)
 {
     if (body->has_density) {
-        const crm_moments m = crm_body_moments(&body->def);
+        const carom_moments m = crm_body_moments(&body->def);
         body->def.mass = body->density * m.area;
         body->def.inertia = body->density * m.second;
     } else if (body->has_mass && !body->has_inertia) {
@@ -63,7 +46,7 @@ void crm_body_follow(crm_scene_body *body)
 static void check_density(crm_problems *problems, const crm_node *node, const carom_body_def *def)
 {
     const crm_node at = crm_member(node, "density");
-    const crm_moments m = crm_body_moments(def);
+    const carom_moments m = crm_body_moments(def);
     if (!(m.area > 0)) {
         crm_fault(problems, &at, "the body has no area; give mass and inertia instead");
     } else if (hypot(m.centroid.x, m.centroid.y) > CENTROID_TOL * m.extent) {
@@ -121,7 +104,7 @@ static void shapes_chain(const crm_scene_body *body, double mass_bar, double ine
         rod_vjp(&def->shapes[0], inertia_bar * def->mass, vertices);
         return;
     }
-    const crm_moments m = crm_body_moments(def);
+    const carom_moments m = crm_body_moments(def);
     double area_bar =
         body->density * mass_bar; /* mass = density * area, inertia = density * second */
     double second_bar = body->density * inertia_bar;

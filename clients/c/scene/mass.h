@@ -4,15 +4,8 @@
 
 #include "scene.h"
 
-/* Moments of the shapes of one body about its position, at density 1; overlaps count twice. */
-typedef struct crm_moments {
-    double area;         /* [m^2] */
-    carom_vec2 centroid; /* [m] */
-    double second;       /* int |x|^2 dA [m^4] */
-    double extent;       /* largest distance of a surface point from the position, at most [m] */
-} crm_moments;
-
-crm_moments crm_body_moments(const carom_body_def *def);
+/* Of the shapes of a body. */
+carom_moments crm_body_moments(const carom_body_def *def);
 
 /* Squared radius of gyration of the shapes about the position [m^2]: inertia = mass * this.  A lone
  * segment has the one of a thin rod.  0: there is no shape with an extent. */

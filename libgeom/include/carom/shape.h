@@ -75,6 +75,15 @@ CAROM_API void carom_shape_mass_vjp(const carom_shape *shape, double density,
                                     carom_mass_properties bar, double *density_bar,
                                     double *radius_bar, carom_vec2 *vertices_bar);
 
+/* Moments of n valid shapes about the origin of their frame, at density 1; overlaps count twice. */
+typedef struct carom_moments {
+    double area;         /* [m^2] */
+    carom_vec2 centroid; /* [m]; the origin where there is no area */
+    double second;       /* int |x|^2 dA [m^4] */
+    double extent;       /* no point of them is farther from the origin [m] */
+} carom_moments;
+CAROM_API carom_moments carom_shapes_moments(int n, const carom_shape *shapes);
+
 /* A shape of a body that has several: out[i] = R(offset.angle) in[i] + (offset.x, offset.y), n of
  * them; out may be in. */
 CAROM_API void carom_vertices_place(int n, const carom_vec2 *in, carom_pose offset,
