@@ -129,7 +129,7 @@ def write_page(title, pieces, path):
         with open(piece, encoding="utf-8", errors="replace") as file:
             rows += [line for line in file if line.startswith("|") and line not in rows[:2]]
     with open(path, "w", encoding="ascii", errors="replace") as out:
-        out.write(f"# {title.capitalize()}\n\nOne thread, the least of several rounds' means; what the columns are: ../performance.md.\n\n")
+        out.write(f"# {title.capitalize()}\n\nOne thread, the least of several rounds' means; what the columns are: [performance.md](../performance.md).\n\n")
         out.writelines(rows)
 
 
