@@ -78,10 +78,11 @@ static void read_joints(const carom_world *w, carom_plan *p)
 {
     for (int k = 0; k < w->n_joints; k++) {
         const crm_joint *j = &w->joints[k];
+        const int limited = j->lower > -HUGE_VAL || j->upper < HUGE_VAL;
         p->joints = 1;
-        p->limits |= j->lower > -HUGE_VAL || j->upper < HUGE_VAL;
+        p->limits |= limited;
         p->drives |= crm_joint_is_driven(j);
-        p->restitution |= p->limits && j->restitution > 0;
+        p->restitution |= limited && j->restitution > 0;
     }
 }
 
