@@ -280,7 +280,8 @@ carom_status crm_bound_bounce(carom_world *w, crm_substep *s, crm_solve *c, crm_
 /* solve.c */
 /* q += scale v for moving bodies. */
 void crm_move(const carom_world *w, double *q, const double *v, double scale);
-/* Rounding error of a position difference, from the farthest body [m]. */
+/* Rounding error of a position difference, from the farthest body, or from the one that has turned
+ * most often [m]. */
 double crm_rounding(const carom_world *w);
 /* Modes and impulses of the first two solves of sub, of length h, from the last accepted sub-step
  * of the island. */

@@ -18,6 +18,7 @@ double crm_rounding(const carom_world *w)
     for (int k = 0; k < w->island->n_bodies; k++) {
         const int b = w->island->bodies[k];
         far = fmax(far, fmax(fabs(w->q[3 * b + 1]), fabs(w->q[3 * b + 2])));
+        far = fmax(far, w->bodies[b].reach * fabs(w->q[3 * b]));
     }
     return 8 * DBL_EPSILON * far;
 }
