@@ -42,10 +42,10 @@ static int contenders(contender *list)
     list[n++].create = two_threads;
     list[n++] = CAROM_CONTENDERS[2];
 #ifdef WITH_BOX2D
-    list[n++] = BOX2D;
+    list[n++] = BOX2D[0];
 #endif
 #ifdef WITH_CHIPMUNK
-    list[n++] = CHIPMUNK;
+    list[n++] = CHIPMUNK[0];
 #endif
     return n;
 }

@@ -1,14 +1,15 @@
 /* Error against run time: carom's integrators, orders and tolerances beside Box2D 2.4 and Chipmunk
  * 7 where these are installed, same scenes, same run, one thread.
  *
- * Usage: bench_precision [--quick] [scene], or bench_precision scene K, which prints scene K as
- * JSON for peers.py.  A scene is a number from 0; prints CSV: scene, contender, steps per second,
- * tolerance [m], error [m], processor seconds per simulated second (median, least and most of the
- * rounds; the first step is not counted), worst status; then, largest over time, overlap [m], gap
- * of a joint [m], gain of energy [J]; seconds of the first step, when nothing is known yet.  The
- * error is that of one body's pose, an angle times its size: at the end, or the largest over time
- * of what should rest.  References are closed forms, or equations of motion of their own
- * (references.c); what these do not resolve is printed as a comment, and is the least error shown.
+ * Usage: bench_precision [--quick] [SCENE], or bench_precision scene SCENE, which prints it as JSON
+ * for peers.py.  A scene is a number from 0 or a scene file of tests/data/scenes; prints CSV:
+ * scene, contender, steps per second, tolerance [m], error [m], processor seconds per simulated
+ * second (median, least and most of the rounds; the first step is not counted), worst status; then,
+ * largest over time, overlap [m], gap of a joint [m], gain of energy [J]; seconds of the first
+ * step, when nothing is known yet.  The error is that of one body's pose, an angle times its size:
+ * at the end, or the largest over time of what should rest.  References are closed forms, or
+ * equations of motion of their own (references.c); what these do not resolve is printed as a
+ * comment, and is the least error shown.
  * --quick: fewer rates and rounds. */
 #include "bench/solver/clock.h"
 #include "bench/step/own.h"
@@ -32,7 +33,7 @@ typedef struct effort {
 
 static const effort FULL = {0.05, 10, 3, 1920, 2};
 static const effort QUICK = {0.01, 0.5, 1, 960, 4};
-enum { MAX_ROUNDS = 101, MAX_CONTENDERS = 9, FIRST_RATE = 15, TOLERANCE_RATE = 60 };
+enum { MAX_ROUNDS = 101, MAX_CONTENDERS = 13, FIRST_RATE = 15, TOLERANCE_RATE = 60 };
 
 /* Of the contender `tolerance`: creation knows the scene alone. */
 static char tolerance[32] = "0";
@@ -70,10 +71,10 @@ static int contenders(contender *list)
         list[n++].create = creators[k];
     }
 #ifdef WITH_BOX2D
-    list[n++] = BOX2D;
+    for (int k = 0; k < 3; k++) list[n++] = BOX2D[k];
 #endif
 #ifdef WITH_CHIPMUNK
-    list[n++] = CHIPMUNK;
+    for (int k = 0; k < 3; k++) list[n++] = CHIPMUNK[k];
 #endif
     return n;
 }
@@ -135,7 +136,7 @@ static double run(const problem *p, const contender *c, int n, counters *count, 
     return time * n / (n - 1);
 }
 
-static int compare(const void *a, const void *b)
+static int compare_times(const void *a, const void *b)
 {
     const double *x = a;
     const double *y = b;
@@ -158,7 +159,7 @@ static double measure(const problem *p, const contender *c, int rate, const effo
         total += times[rounds++];
         if (total > work->too_long) break;
     }
-    qsort(times, (size_t)rounds, sizeof *times, compare);
+    qsort(times, (size_t)rounds, sizeof *times, compare_times);
     const int chosen = strcmp(c->name, "carom tolerance") == 0;
     printf("%s,%s,%d,%s,%.3e,%.3e,%.3e,%.3e,%d,%.1e,%.1e,%.1e,%.1e\n", p->name, c->name, rate,
            chosen ? tolerance : "0", f.error, times[rounds / 2] / p->duration,
@@ -213,32 +214,43 @@ static void print_scene(const problem *p)
     printf("]}\n");
 }
 
-int main(int argc, char **argv)
+/* A number or a file; what is neither ends the program. */
+static problem find_problem(const char *word)
+{
+    char *end;
+    const long k = strtol(word, &end, 10);
+    if (*end) return read_problem(word);
+    if (k < 0 || k >= N_PROBLEMS) {
+        fprintf(stderr, "usage: bench_precision [--quick] [0..%d | FILE]\n", N_PROBLEMS - 1);
+        exit(1);
+    }
+    return make_problem((int)k);
+}
+
+static void compare(problem p, const effort *work)
 {
     contender list[MAX_CONTENDERS];
     const int n = contenders(list);
+    find_reference(&p);
+    printf("# %s: errors below %.1e m are not resolved\n", p.name, p.resolved);
+    for (int i = 0; i < n; i++) curve(&p, &list[i], work);
+    free_problem(&p);
+}
+
+int main(int argc, char **argv)
+{
     if (argc == 3 && strcmp(argv[1], "scene") == 0) {
-        problem p = make_problem(atoi(argv[2]));
+        problem p = find_problem(argv[2]);
         find_reference(&p);
         print_scene(&p);
         free_problem(&p);
         return 0;
     }
     const int quick = argc > 1 && strcmp(argv[1], "--quick") == 0;
-    const int one = argc > 1 + quick;
-    const int first = one ? atoi(argv[1 + quick]) : 0;
-    const int last = one ? first : N_PROBLEMS - 1;
-    if (first < 0 || last >= N_PROBLEMS) {
-        fprintf(stderr, "usage: bench_precision [--quick] [0..%d]\n", N_PROBLEMS - 1);
-        return 1;
-    }
+    const effort *work = quick ? &QUICK : &FULL;
+    const char *one = argc > 1 + quick ? argv[1 + quick] : NULL;
     printf("scene,contender,rate,tolerance,error,cost,least,most,status,overlap,gap,gain,first\n");
-    for (int k = first; k <= last; k++) {
-        problem p = make_problem(k);
-        find_reference(&p);
-        printf("# %s: errors below %.1e m are not resolved\n", p.name, p.resolved);
-        for (int i = 0; i < n; i++) curve(&p, &list[i], quick ? &QUICK : &FULL);
-        free_problem(&p);
-    }
+    for (int k = 0; !one && k < N_PROBLEMS; k++) compare(make_problem(k), work);
+    if (one) compare(find_problem(one), work);
     return 0;
 }

@@ -25,8 +25,8 @@ Each scene is stepped by every integrator, order and tolerance of carom, and by 
 run). Error: of one body's pose at the end, or the largest over time of what should rest, an angle times its size [m]. Cost: processor seconds per simulated second, the median of the rounds, without the
 first step; one thread, everything in one run. `tolerance` runs at 60 steps per second with tolerances of 1e-2 to 1e-12 m. References are closed forms, or, for curved
 motion, equations of motion of their own in minimal coordinates, apart from carom (`bench/precision/references.c`: long double, order 4, events by bisection, 8000 and 16000 steps);
-the least error shown is a thousand times what those two differ by. A curve ends where a run takes too long. Box2D runs 8 velocity and 3 position iterations,
-Chipmunk 10; pymunk is Chipmunk. MuJoCo, where it is installed, runs its stiffest stable contact (`bench/precision/peers.py`); it has no restitution.
+the least error shown is a thousand times what those two differ by. Scenes named by a file are those of `tests/data/scenes`, without the piles, which have no reference.
+A curve ends where a run takes too long. Box2D runs 8 velocity and 3 position iterations, Chipmunk 10, both also four and sixteen times as many (x4, x16); pymunk is Chipmunk. MuJoCo, where it is installed, runs its stiffest stable contact (`bench/precision/peers.py`); it has no restitution.
 
 ![Error against processor seconds per simulated second](precision.svg)
 

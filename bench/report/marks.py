@@ -78,6 +78,28 @@ def table_of(name):
         return list(csv.DictReader(file))
 
 
+def error_at(rows, scene, name, rate=60):
+    """(error, status) of a contender in a scene, or None."""
+    found = [(r["error"], r["status"]) for r in rows if (r["scene"], r["contender"], r["rate"]) == (scene, name, rate)]
+    return found[0] if found else None
+
+
+def failures(rows):
+    """Where peers failed outright, beside errors [m] of this run at 60 steps per second with the defaults."""
+    peers = [name for name in dict.fromkeys(r["contender"] for r in rows) if not name.startswith("carom") and " x" not in name]
+    lines = ["", "## Where peers fail outright", "",
+             "As measured on another day; then errors [m] of this run at 60 steps per second with what each comes with.", "",
+             f"| scene | who | what | {' | '.join(peers)} | carom located | |", "|---" * (5 + len(peers)) + "|"]
+    for m in table_of("failure_marks.csv"):
+        own = error_at(rows, m["scene"], "carom located")
+        errors = [error_at(rows, m["scene"], name) for name in peers]
+        if own:
+            others = " | ".join(f"{e[0]:.1e}" if e else "-" for e in errors)
+            holds = own[1] == 0 and all(not e or own[0] < e[0] for e in errors)
+            lines.append(f"| {m['scene']} | {m['who']} | {m['what']} | {others} | {own[0]:.1e} | {'won' if holds else 'lost'} |")
+    return lines
+
+
 def gradients(out):
     """Errors and costs of gradients beside the marks, from gradient.csv; none when that has not run."""
     path = os.path.join(out, "gradient.csv")
@@ -132,7 +154,7 @@ def main(path, out):
     closing = (f"\n{won} won, {lost} lost. Where the peers of this run do not reach an error, the mark stands for them.\n\n"
                "Errors below these marks, and scenes with none, are in precision.md: carom alone reaches them.\n")
     with open(os.path.join(out, "marks.md"), "w", encoding="ascii") as file:
-        file.write(HEAD + "\n".join(lines) + "\n" + closing + "\n".join(steps(out) + gradients(out)) + "\n")
+        file.write(HEAD + "\n".join(lines) + "\n" + closing + "\n".join(failures(rows) + steps(out) + gradients(out)) + "\n")
 
 
 if __name__ == "__main__":

@@ -19,14 +19,18 @@ import time
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 
-N_PRECISION = 20
+N_PRECISION = 21
+# with a reference: a pile has none
+SCENE_FILES = sorted(path for path in glob.glob(os.path.join(ROOT, "tests", "data", "scenes", "*.json"))
+                     if not os.path.basename(path).startswith("j_"))
 GROWTH = ("free", "chain", "stack", "pyramid", "pile", "islands", "hub")
 
 
 # A piece is one command; `scene` pipes a scene of the program into a script of the peers' Python; `count`
 # hands the program to the part's count.py.
 def precision_pieces():
-    return [piece for k in range(N_PRECISION) for piece in ([str(k)], ["scene", str(k)])]
+    scenes = [*map(str, range(N_PRECISION)), *SCENE_FILES]
+    return [piece for scene in scenes for piece in ([scene], ["scene", scene])]
 
 
 def step_pieces():
@@ -133,23 +137,40 @@ def write_page(title, pieces, path):
         out.writelines(rows)
 
 
+class Facts:
+    """What is known of each part, kept in a file."""
+
+    def __init__(self, path):
+        self.path = path
+        self.parts = {}
+        if os.path.exists(path):
+            with open(path, encoding="utf-8") as file:
+                self.parts = json.load(file)
+
+    def of(self, part):
+        return self.parts.get(part, {})
+
+    def set(self, part, facts):
+        self.parts[part] = facts
+        with open(self.path, "w", encoding="utf-8") as file:
+            json.dump(self.parts, file, indent=1)
+            file.write("\n")
+
+
 class Report:
     def __init__(self, options):
         self.options = options
         self.kind = "quick" if options.quick else "full"
-        self.stamps = os.path.join(options.work, "parts.json")
-        self.done = {}
-        if os.path.exists(self.stamps):
-            with open(self.stamps, encoding="utf-8") as file:
-                self.done = json.load(file)
+        # what the pages show, wherever it ran; what this work folder has itself run
+        self.shown = Facts(os.path.join(options.out, "parts.json"))
+        self.done = Facts(os.path.join(options.work, "parts.json"))
 
     def remember(self, part, facts):
-        self.done[part] = facts
-        with open(self.stamps, "w", encoding="utf-8") as file:
-            json.dump(self.done, file, indent=1)
+        self.shown.set(part, facts)
+        self.done.set(part, facts)
 
     def is_done(self, part):
-        return self.done.get(part, {}).get("kind") == self.kind and not self.options.again
+        return self.done.of(part).get("kind") == self.kind and not self.options.again
 
     def program(self, part):
         return os.path.join(self.options.bin, PARTS[part][0])
@@ -216,7 +237,7 @@ class Report:
                  "Made by `./dev report`; nothing on these pages is written by hand. `--quick` takes minutes, the full run hours.", "",
                  "| part | shows | run | commit | date | took |", "|---|---|---|---|---|---|"]
         for part, (_, _, shows) in PARTS.items():
-            facts = self.done.get(part)
+            facts = self.shown.of(part)
             page = f"[{part}]({part}.md)" if os.path.exists(os.path.join(self.options.out, f"{part}.md")) else part
             if facts:
                 lines.append(f"| {page} | {shows} | {facts['kind']} | {', '.join(facts.get('commits', []))} | {facts['date']} | {facts['seconds']:.0f} s |")
@@ -226,7 +247,7 @@ class Report:
             lines.append("| [marks](marks.md) | carom beside every mark of its peers | with precision | | | |")
         lines += ["", "## Machine and versions", "", *machine(), "", "## Commands", ""]
         for part in PARTS:
-            commands = self.done.get(part, {}).get("commands", [])
+            commands = self.shown.of(part).get("commands", [])
             for command in commands[:2]:
                 lines.append(f"* `{command}`" + (" and so on, piece by piece" if len(commands) > 2 else ""))
         with open(os.path.join(self.options.out, "README.md"), "w", encoding="ascii", errors="replace") as file:

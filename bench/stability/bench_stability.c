@@ -35,11 +35,11 @@ static int engines(engine *list)
                            {"euler", NULL, CAROM_EULER, 2}};
     for (int k = 0; k < 4; k++) list[n++] = own[k];
 #ifdef WITH_BOX2D
-    const engine box2d = {"Box2D 2.4", &BOX2D, CAROM_EULER, 0};
+    const engine box2d = {"Box2D 2.4", &BOX2D[0], CAROM_EULER, 0};
     list[n++] = box2d;
 #endif
 #ifdef WITH_CHIPMUNK
-    const engine chipmunk = {"Chipmunk 7", &CHIPMUNK, CAROM_EULER, 0};
+    const engine chipmunk = {"Chipmunk 7", &CHIPMUNK[0], CAROM_EULER, 0};
     list[n++] = chipmunk;
 #endif
     return n;

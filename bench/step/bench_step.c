@@ -111,10 +111,10 @@ int main(int argc, char **argv)
     int n = 0;
     int failed = 0;
 #ifdef WITH_BOX2D
-    all[n++] = &BOX2D;
+    all[n++] = &BOX2D[0];
 #endif
 #ifdef WITH_CHIPMUNK
-    all[n++] = &CHIPMUNK;
+    all[n++] = &CHIPMUNK[0];
 #endif
     const int first_own = n;
     for (int k = 0; k < 3; k++) all[n++] = &CAROM_CONTENDERS[k];

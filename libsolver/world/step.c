@@ -7,8 +7,9 @@
 static const double CARRY_TOL = 1e-13;
 /* Two shapes that together are no thicker are slivers [L]. */
 static const double SLIVER = 1e-2;
-/* Moving bodies times sub-steps of one frame, and sub-steps beyond all counting. */
-enum { BODY_SUBSTEPS = 128, MAX_SUBSTEPS = 256 };
+/* Held bodies times sub-steps of one frame; how many in flight are as much work as one that is held;
+ * and sub-steps beyond all counting. */
+enum { BODY_SUBSTEPS = 128, FLYING = 16, MAX_SUBSTEPS = 256 };
 /* How often contacts are added that only the end of a sub-step shows. */
 enum { MAX_LOOKS = 3 };
 /* How often pairs are looked for again when bodies leave the room foreseen for them. */
@@ -66,14 +67,26 @@ static carom_status commit(carom_world *w)
     return CAROM_OK;
 }
 
-/* Sub-steps of the island in one frame: an impact solves all of it, so large ones get fewer. */
-static int substeps_allowed(const carom_world *w)
+/* Whether a sub-step may end before the frame: at an event, or by its error. */
+static int ends_early(const carom_world *w)
 {
-    if (w->settings.integrator == CAROM_FIXED) return 1;
-    if (w->settings.tolerance > 0) return w->settings.max_substeps;
-    const int n = w->island->n_bodies > 0 ? BODY_SUBSTEPS / w->island->n_bodies : BODY_SUBSTEPS;
-    if (n < 1 || (!w->island->n_pairs && !w->island->n_limited)) return 1;
-    return n < w->settings.max_substeps ? n : w->settings.max_substeps;
+    if (w->settings.integrator == CAROM_FIXED) return 0;
+    return w->settings.tolerance > 0 || w->island->n_pairs || w->island->n_limited;
+}
+
+/* Sub-steps of the frame beyond this one: each solves for all bodies that contacts or joints hold, so
+ * that large islands get fewer. */
+static int substeps_left(const carom_world *w)
+{
+    const int done = w->n_substeps - w->n_stiff + 1;
+    const int n_bodies = w->island->n_bodies;
+    const int n_rows = w->sub.n_contacts + w->island->n_joints;
+    const int work = (n_rows < n_bodies ? n_rows : n_bodies) + n_bodies / FLYING;
+    const int n = BODY_SUBSTEPS / (work > 0 ? work : 1);
+    if (w->settings.tolerance > 0 || n > w->settings.max_substeps) {
+        return w->settings.max_substeps - done;
+    }
+    return n - done;
 }
 
 /* Whether a contact that was ahead closed: an event that nobody located. */
@@ -117,18 +130,20 @@ static carom_status run_last(carom_world *w, double left)
     return e >= 0 && e < CAROM_LIMIT && missed ? CAROM_LIMIT : e;
 }
 
-/* Up to the next event; *busy: there are more of them than sub-steps allowed. */
-static carom_status run_located(carom_world *w, double left, int allowed, int *busy)
+/* Up to the next event; *busy: there are more of them than sub-steps left. */
+static carom_status run_located(carom_world *w, double left, int *busy)
 {
     carom_status e = find_contacts(w, left, 0);
     if (e < 0) return e;
     const int hit = w->smooth && crm_select_impact(w);
     const int tired = w->n_impacts >= MAX_IMPACTS;
     if (w->smooth && !(hit && tired)) crm_select_contacts(w, hit);
+    const int further = substeps_left(w);
+    *busy = further <= 0;
+    if (*busy) return CAROM_OK;
     crm_guess_load(w, left);
-    *busy = 0;
     if (hit) return crm_impact(w, tired);
-    return crm_locate(w, left, allowed, busy);
+    return crm_locate(w, left, further, busy);
 }
 
 /* A sub-step over `share` of the time left, which knew of no more than that. */
@@ -146,10 +161,9 @@ static void end_early(carom_world *w, double share)
 /* Over `span` of the time left; its joint forces are known then. */
 static carom_status try_substep(carom_world *w, double span, int last)
 {
-    const int allowed = substeps_allowed(w) + w->n_stiff - w->n_substeps - 1;
-    int busy = last || allowed <= 0 || w->effort >= CRM_WORN;
+    int busy = last || !ends_early(w) || w->effort >= CRM_WORN;
     begin_substep(w);
-    carom_status e = busy ? CAROM_OK : run_located(w, span, allowed, &busy);
+    carom_status e = busy ? CAROM_OK : run_located(w, span, &busy);
     if (e >= 0 && busy) e = run_last(w, span);
     if (e >= 0) crm_joint_totals(w);
     return e;
