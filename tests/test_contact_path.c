@@ -38,7 +38,7 @@ static void inside_free(inside *o)
 static crm_island island(inside *o, const carom_contact_problem *p, int i)
 {
     crm_system_gather(&o->system, &o->graph, p, i);
-    crm_island s = crm_system_island(&o->system, &o->graph, &o->pattern, i);
+    crm_island s = *crm_system_begin(&o->system, i);
     s.accept = 1e-10;
     return s;
 }

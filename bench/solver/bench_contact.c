@@ -57,7 +57,7 @@ static void prepare(bench *b)
         carom_contact_create(NULL, NULL, &b->solver) < 0)
         exit(1);
     crm_system_gather(&b->system, &b->graph, &b->c.p, 0);
-    b->island = crm_system_island(&b->system, &b->graph, &b->pattern, 0);
+    b->island = *crm_system_begin(&b->system, 0);
     set_responses(b);
 }
 

@@ -39,7 +39,7 @@ static int solve_inside(inside *o, const carom_contact_problem *p, int lemke)
     inside_update(o, p);
     for (int i = 0; i < o->graph.n_islands; i++) {
         crm_system_gather(&o->system, &o->graph, p, i);
-        crm_island s = crm_system_island(&o->system, &o->graph, &o->pattern, i);
+        crm_island s = *crm_system_begin(&o->system, i);
         s.accept = 1e-10;
         crm_vec_zero(&s, s.x);
         if (!lemke) {

@@ -206,24 +206,24 @@ static void solve_island(carom_contact_solver *c, const double *v_bar, double to
 {
     const crm_graph *g = &c->graph;
     const crm_system *y = &c->system;
-    crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
-    double *bar = s.size;
+    crm_island *s = crm_system_begin(&c->system, island);
+    double *bar = s->size;
     const double *root = y->root + 3 * g->node_ptr[island];
     const int *body_of = g->body_of + g->node_ptr[island];
-    for (int i = 0; i < 3 * s.nb; i++) bar[i] = root[i] * v_bar[3 * body_of[i / 3] + i % 3];
-    crm_island_adjoint(&s, bar, tol, masses_differ(&s, root) ? EXTRA : 0);
-    for (int i = 0; i < 3 * s.nb; i++) {
-        if (root[i] > 0) a->p[3 * body_of[i / 3] + i % 3] = s.x.z[i] / root[i];
+    for (int i = 0; i < 3 * s->nb; i++) bar[i] = root[i] * v_bar[3 * body_of[i / 3] + i % 3];
+    crm_island_adjoint(s, bar, tol, masses_differ(s, root) ? EXTRA : 0);
+    for (int i = 0; i < 3 * s->nb; i++) {
+        if (root[i] > 0) a->p[3 * body_of[i / 3] + i % 3] = s->x.z[i] / root[i];
     }
-    for (int k = 0; k < s.nc; k++) {
+    for (int k = 0; k < s->nc; k++) {
         const int slot = g->contact_ptr[island] + k;
-        a->cn[g->contact_of[slot]] = -y->scale_n[slot] * s.x.n[k];
-        a->ct[g->contact_of[slot]] = sticks(&s, k) ? -y->scale_t[slot] * s.x.t[k] : 0;
+        a->cn[g->contact_of[slot]] = -y->scale_n[slot] * s->x.n[k];
+        a->ct[g->contact_of[slot]] = sticks(s, k) ? -y->scale_t[slot] * s->x.t[k] : 0;
     }
-    for (int q = 0; q < s.ng; q++) {
+    for (int q = 0; q < s->ng; q++) {
         const int slot = g->group_ptr[island] + q;
         for (int i = 0; i < g->group_size[slot]; i++)
-            a->ce[g->group_row[slot] + i] = -y->scale_e[3 * slot + i] * s.x.z[3 * (s.nb + q) + i];
+            a->ce[g->group_row[slot] + i] = -y->scale_e[3 * slot + i] * s->x.z[3 * (s->nb + q) + i];
     }
 }
 
@@ -355,8 +355,7 @@ carom_status carom_contact_adjoint(carom_contact_solver *solver,
     if (s >= 0) s = crm_solver_prepare(solver, p);
     for (int i = 0; s >= 0 && i < solver->graph.n_islands; i++) {
         crm_system_gather(&solver->system, &solver->graph, p, i);
-        crm_island y = crm_system_island(&solver->system, &solver->graph, &solver->pattern, i);
-        crm_system_set_modes(&solver->graph, &y, i, x->mode);
+        crm_system_set_modes(&solver->graph, crm_system_begin(&solver->system, i), i, x->mode);
     }
     if (s < 0) return s;
     adjoint a = carve(solver->scratch, p);

@@ -56,15 +56,16 @@ carom_status crm_solver_prepare(carom_contact_solver *c, const carom_contact_pro
     crm_memory *m = &c->memory;
     int same;
     carom_status s = crm_graph_update(m, &c->graph, p, &same);
-    if (!same) c->pattern_valid = 0;
+    if (!same) c->pattern_valid = c->system_valid = 0;
     if (s < 0) return s;
     if (!c->pattern_valid) {
         s = crm_block_analyze(m, &c->pattern, &c->graph);
         if (s < 0) return s;
         c->pattern_valid = 1;
     }
+    if (c->system_valid) return CAROM_OK;
     s = crm_system_reserve(m, &c->system, &c->graph, &c->pattern);
-    for (int i = 0; s >= 0 && !same && i < c->graph.n_islands; i++) c->system.key[i].valid = 0;
+    c->system_valid = s >= 0;
     return s;
 }
 
@@ -108,8 +109,7 @@ static void write_solution(carom_contact_solver *c, const carom_contact_problem 
 {
     write_rest(&c->graph, p, x);
     for (int i = 0; i < c->graph.n_islands; i++) {
-        const crm_island s = crm_system_island(&c->system, &c->graph, &c->pattern, i);
-        crm_system_write(&c->system, &c->graph, p, &s, i, x);
+        crm_system_write(&c->system, &c->graph, p, &c->system.island[i], i, x);
     }
 }
 

@@ -82,20 +82,20 @@ static void solve_island(job *j, int island)
     const crm_graph *g = &c->graph;
     crm_outcome *o = &c->system.outcome[island];
     crm_system_gather(&c->system, g, j->p, island);
-    crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
-    s.accept = c->settings.accept;
-    s.inexact = c->settings.inexact;
-    s.max_iterations = c->settings.max_iterations;
-    s.max_restarts = c->settings.max_restarts;
-    s.brief = j->use_guess & CAROM_GUESS_BRIEF;
+    crm_island *s = crm_system_begin(&c->system, island);
+    s->accept = c->settings.accept;
+    s->inexact = c->settings.inexact;
+    s->max_iterations = c->settings.max_iterations;
+    s->max_restarts = c->settings.max_restarts;
+    s->brief = j->use_guess & CAROM_GUESS_BRIEF;
     const int guess = j->use_guess & ~CAROM_GUESS_BRIEF;
-    if (guess) crm_system_read(&c->system, g, &s, island, j->x, guess);
-    o->status = crm_ladder_climb(&s, guess, &o->stage, &o->unpolished);
-    o->factorizations = s.factorizations;
-    o->iterations = s.iterations;
-    o->pivots = s.pivots;
-    o->blocks = s.factorizations ? 2 * (s.lu.lp[s.lu.n] - s.lu.lp[0]) + s.lu.n : 0;
-    o->degenerate = o->status == CAROM_E_INFEASIBLE ? 0 : count_degenerate(&s);
+    if (guess) crm_system_read(&c->system, g, s, island, j->x, guess);
+    o->status = crm_ladder_climb(s, guess, &o->stage, &o->unpolished);
+    o->factorizations = s->factorizations;
+    o->iterations = s->iterations;
+    o->pivots = s->pivots;
+    o->blocks = s->factorizations ? 2 * (s->lu.lp[s->lu.n] - s->lu.lp[0]) + s->lu.n : 0;
+    o->degenerate = o->status == CAROM_E_INFEASIBLE ? 0 : count_degenerate(s);
 }
 
 #ifdef CRM_THREADS
@@ -128,7 +128,7 @@ static void solve_all(job *j)
     pthread_t thread[CRM_MAX_THREADS];
     const int n = count_threads(j->c);
     int started = 0;
-    if (pthread_mutex_init(&j->mutex, NULL)) {
+    if (n <= 1 || pthread_mutex_init(&j->mutex, NULL)) {
         for (int i = 0; i < j->c->graph.n_islands; i++) solve_island(j, i);
         return;
     }
@@ -167,6 +167,5 @@ carom_status crm_islands_solve(carom_contact_solver *c, const carom_contact_prob
         if (c->system.outcome[i].status == CAROM_E_INFEASIBLE && infeasible < 0) infeasible = i;
     }
     if (infeasible < 0) return CAROM_OK;
-    const crm_island s = crm_system_island(&c->system, &c->graph, &c->pattern, infeasible);
-    return give_certificate(c, p, &s, infeasible);
+    return give_certificate(c, p, &c->system.island[infeasible], infeasible);
 }

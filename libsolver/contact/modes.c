@@ -9,13 +9,13 @@ static void solve_island(carom_contact_solver *c, const carom_contact_problem *p
 {
     const crm_graph *g = &c->graph;
     crm_system_gather(&c->system, g, p, island);
-    crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
-    crm_system_set_modes(g, &s, island, x->mode);
-    for (int k = 0; k < s.nc; k++) s.best_mode[k] = s.mode[k];
-    crm_vec_zero(&s, s.x);
-    crm_solve_modes(&s, CRM_PASSES);
-    crm_vec_copy(&s, s.best, s.x);
-    crm_system_write(&c->system, g, p, &s, island, x);
+    crm_island *s = crm_system_begin(&c->system, island);
+    crm_system_set_modes(g, s, island, x->mode);
+    for (int k = 0; k < s->nc; k++) s->best_mode[k] = s->mode[k];
+    crm_vec_zero(s, s->x);
+    crm_solve_modes(s, CRM_PASSES);
+    crm_vec_copy(s, s->best, s->x);
+    crm_system_write(&c->system, g, p, s, island, x);
 }
 
 carom_status carom_contact_modes(carom_contact_solver *solver, const carom_contact_problem *problem,

@@ -10,6 +10,7 @@ struct carom_contact_solver {
     crm_graph graph;
     crm_block_pattern pattern;
     int pattern_valid;
+    int system_valid; /* laid out for the pattern */
     crm_system system;
     double *scratch; /* solve: 6 per body; adjoint: see adjoint.c */
     int scratch_max;

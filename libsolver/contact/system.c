@@ -21,6 +21,7 @@ static void layout(crm_arena *a, crm_system *y, const crm_graph *g, const crm_bl
     y->free = crm_arena_doubles(a, 3 * nn);
     y->speed = crm_arena_doubles(a, g->n_islands);
     y->outcome = crm_arena_take(a, (size_t)g->n_islands, sizeof(crm_outcome));
+    y->island = crm_arena_take(a, (size_t)g->n_islands, sizeof(crm_island));
     y->response = crm_arena_take(a, (size_t)nc, sizeof(crm_response));
     y->key = crm_arena_take(a, (size_t)g->n_islands, sizeof(crm_factor_key));
     y->key_row = crm_arena_doubles(a, CRM_KEY_ROW * nc);
@@ -45,17 +46,6 @@ static void layout(crm_arena *a, crm_system *y, const crm_graph *g, const crm_bl
     y->pivot = crm_arena_ints(a, 2 * s->n);
     y->lu_work = crm_arena_ints(a, 5 * s->n);
     y->lu_x = crm_arena_doubles(a, 3 * s->n);
-}
-
-carom_status crm_system_reserve(crm_memory *m, crm_system *y, const crm_graph *g,
-                                const crm_block_pattern *s)
-{
-    crm_arena measure = {0};
-    layout(&measure, y, g, s);
-    const carom_status status = crm_arena_reserve(m, &y->arena, measure.used);
-    if (status < 0) return status;
-    layout(&y->arena, y, g, s);
-    return CAROM_OK;
 }
 
 void crm_system_free(crm_memory *m, crm_system *y)
@@ -236,8 +226,8 @@ static crm_block_lu lu_view(const crm_system *y, const crm_block_pattern *s, int
                           .x = y->lu_x + 3 * first};
 }
 
-crm_island crm_system_island(const crm_system *y, const crm_graph *g, const crm_block_pattern *s,
-                             int island)
+static crm_island view_of(const crm_system *y, const crm_graph *g, const crm_block_pattern *s,
+                          int island)
 {
     const int node = g->node_ptr[island];
     const int contact = g->contact_ptr[island];
@@ -262,12 +252,35 @@ crm_island crm_system_island(const crm_system *y, const crm_graph *g, const crm_
                     .column = y->column + CRM_PATH_WORK * (size_t)contact,
                     .base_mode = y->base_mode + contact,
                     .mode = y->mode + contact,
-                    .best_mode = y->best_mode + contact,
-                    .best_residual = HUGE_VAL};
+                    .best_mode = y->best_mode + contact};
     i.lu = lu_view(y, s, first, i.nb + i.ng);
     for (int k = 0; k < CRM_N_SLACKS; k++) i.slack[k] = y->slack[k] + contact;
     set_vectors(&i, y, first, contact);
     return i;
+}
+
+carom_status crm_system_reserve(crm_memory *m, crm_system *y, const crm_graph *g,
+                                const crm_block_pattern *s)
+{
+    crm_arena measure = {0};
+    layout(&measure, y, g, s);
+    const carom_status status = crm_arena_reserve(m, &y->arena, measure.used);
+    if (status < 0) return status;
+    layout(&y->arena, y, g, s);
+    for (int i = 0; i < g->n_islands; i++) {
+        y->island[i] = view_of(y, g, s, i);
+        y->key[i].valid = 0;
+    }
+    return CAROM_OK;
+}
+
+crm_island *crm_system_begin(crm_system *y, int island)
+{
+    crm_island *s = &y->island[island];
+    s->best_residual = HUGE_VAL;
+    s->fresh = 0;
+    s->factorizations = s->iterations = s->pivots = 0;
+    return s;
 }
 
 /* Impulse in the island's units: l = D V l^. */

@@ -27,6 +27,7 @@ typedef struct crm_system {
     double *free;
     double *speed;        /* per island: velocity unit V of its variables */
     crm_outcome *outcome; /* per island */
+    crm_island *island;   /* the views of all below */
     /* Work of the islands, sliced. */
     crm_response *response;
     crm_factor_key *key; /* per island */
@@ -50,7 +51,7 @@ typedef struct crm_system {
     double *lu_x;
 } crm_system;
 
-/* Makes room; nothing is allocated when there is room already. */
+/* Makes room, with no factors in it; nothing is allocated when there is room already. */
 carom_status crm_system_reserve(crm_memory *m, crm_system *y, const crm_graph *g,
                                 const crm_block_pattern *s);
 void crm_system_free(crm_memory *m, crm_system *y);
@@ -58,9 +59,8 @@ void crm_system_free(crm_memory *m, crm_system *y);
 /* Gathers and scales the values of an island. */
 void crm_system_gather(crm_system *y, const crm_graph *g, const carom_contact_problem *p,
                        int island);
-/* View of an island. */
-crm_island crm_system_island(const crm_system *y, const crm_graph *g, const crm_block_pattern *s,
-                             int island);
+/* An island as it begins: nothing found, nothing counted. */
+crm_island *crm_system_begin(crm_system *y, int island);
 
 /* Takes the guess of the island's modes, and of its impulses with CAROM_GUESS_IMPULSES, into
  * s->mode and s->x; impulses that are not finite are 0. */

@@ -187,15 +187,15 @@ static void solve_island(carom_contact_solver *c, int island, tangent *t)
     const crm_graph *g = &c->graph;
     const double size = set_constants(&c->system, g, island, t);
     if (!(size > 0)) return;
-    crm_island s = crm_system_island(&c->system, g, &c->pattern, island);
-    crm_vec_zero(&s, s.x);
-    crm_solve_modes(&s, CRM_PASSES);
-    double *z = s.x.z;
-    if (row_miss(&s) > AT_ODDS) {
+    crm_island *s = crm_system_begin(&c->system, island);
+    crm_vec_zero(s, s->x);
+    crm_solve_modes(s, CRM_PASSES);
+    double *z = s->x.z;
+    if (row_miss(s) > AT_ODDS) {
         z = t->change; /* as large, and used up */
-        transpose_adjoint(&s, z, t->spare);
+        transpose_adjoint(s, z, t->spare);
     }
-    for (int i = 0; i < 3 * s.nb; i++) {
+    for (int i = 0; i < 3 * s->nb; i++) {
         const int node = g->node_ptr[island] + i / 3;
         t->e[3 * g->body_of[node] + i % 3] += size * c->system.root[3 * node + i % 3] * z[i];
     }
@@ -240,8 +240,7 @@ carom_status carom_contact_tangent(carom_contact_solver *solver,
     if (s >= 0) s = crm_solver_prepare(solver, p);
     for (int i = 0; s >= 0 && i < solver->graph.n_islands; i++) {
         crm_system_gather(&solver->system, &solver->graph, p, i);
-        crm_island y = crm_system_island(&solver->system, &solver->graph, &solver->pattern, i);
-        crm_system_set_modes(&solver->graph, &y, i, x->mode);
+        crm_system_set_modes(&solver->graph, crm_system_begin(&solver->system, i), i, x->mode);
     }
     return s < 0 ? s : carom_contact_tangent_again(solver, p, x, direction, dv);
 }
