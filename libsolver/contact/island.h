@@ -101,7 +101,8 @@ typedef struct crm_island {
     unsigned char *mode;         /* nc: carom_contact_mode */
     unsigned char *best_mode;
     double best_residual;
-    int fresh; /* an and ut belong to best */
+    int fresh;         /* an and ut belong to best */
+    double compliance; /* of the last equations of modes */
     double accept;
     double inexact; /* a point this good ends the restarts early */
     int max_iterations;

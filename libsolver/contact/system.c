@@ -279,6 +279,7 @@ crm_island *crm_system_begin(crm_system *y, int island)
     crm_island *s = &y->island[island];
     s->best_residual = HUGE_VAL;
     s->fresh = 0;
+    s->compliance = CRM_COMPLIANCE;
     s->factorizations = s->iterations = s->pivots = 0;
     return s;
 }

@@ -13,6 +13,7 @@ static const double NEWTON_TOL = 1e-14;
 enum { PATIENT = 25, MAX_NEWTON = 40, MAX_VAIN = 10 };
 static const double LOOSE = 1e-9;
 static const double FAR = 1e2;
+static const double HALF = 0.5;
 /* Speeds beyond this are no error of second order but another solution [what forces can give]. */
 static const double GAIN = 1.5;
 /* From here on it is said: the step is long for what turns in it. */
@@ -169,24 +170,30 @@ static void next_iterate(carom_world *w, const crm_substep *s, crm_solve *c, crm
     take_sides(w, s, asked, a->point, c);
 }
 
-/* The iteration of stage 1, rows and first right-hand sides in place. */
+/* The iteration of stage 1, rows and first right-hand sides in place.  Between a first and a last
+ * solve, which decide on the modes, passes follow the right-hand sides while they gain by HALF. */
 static carom_status iterate(carom_world *w, crm_substep *s, crm_solve *c)
 {
     const double tol = NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
+    const double loose = LOOSE * w->length;
     double best = HUGE_VAL;
     int vain = 0;
+    int solved = 1; /* by this iteration, not passed */
     for (int k = 0; k < MAX_NEWTON && vain <= MAX_VAIN && w->effort < CRM_WORN; k++) {
-        const carom_status e = crm_solve_run(w, s, c, 1);
+        const carom_status e = solved ? crm_solve_run(w, s, c, 1) : crm_solve_pass(w, s, c);
         if (e < 0) return e;
         end_pose(w, s, c);
         if (!s->n_contacts && !w->island->n_rows) return CAROM_OK;
         const double moved = next_sides(w, s, c, &s->solve[1]);
-        if (moved <= tol) return CAROM_OK;
-        if (k >= PATIENT && moved <= LOOSE * w->length) return CAROM_INEXACT;
-        if (!(moved < FAR * w->length)) return CAROM_E_NO_SOLUTION;
+        const int near = moved <= tol || (k >= PATIENT && moved <= loose);
+        const int lost = !(moved < FAR * w->length);
+        if (solved && near) return moved <= tol ? CAROM_OK : CAROM_INEXACT;
+        if (solved && lost) return CAROM_E_NO_SOLUTION;
+        const int gains = moved < HALF * best;
         vain = moved < best ? 0 : vain + 1;
         best = fmin(best, moved);
-        next_iterate(w, s, c, &s->solve[1]);
+        solved = near || lost || (k > 0 && !gains) || w->island->n_driven;
+        if (!near && !lost) next_iterate(w, s, c, &s->solve[1]);
     }
     return CAROM_E_NO_SOLUTION;
 }

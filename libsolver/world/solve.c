@@ -122,6 +122,18 @@ carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use
     return e;
 }
 
+carom_status crm_solve_pass(carom_world *w, const crm_substep *s, crm_solve *c)
+{
+    const carom_contact_problem p = crm_problem(w, s, c);
+    carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
+    int n = 0;
+    const carom_status e = carom_contact_pass(s->keep ? w->solver : crm_solver(w), &p, &x, &n);
+    w->effort += n;
+    w->stats->factorizations += n;
+    take_velocities(w, w->rows.v, c->v);
+    return e;
+}
+
 static int unsolved(carom_status e)
 {
     return e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION;

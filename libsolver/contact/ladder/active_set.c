@@ -76,6 +76,7 @@ static double find_defect(crm_island *s, int settle)
 
 static void factor_modes(crm_island *s, double compliance)
 {
+    s->compliance = compliance;
     crm_set_responses(s, compliance);
     crm_island_factor(s, 1, compliance);
 }

@@ -6,6 +6,8 @@
  * far below `accept`, so that the solution stays a smooth function of the data, for differences
  * too [1]. */
 #define GUESS_EXACT 1e-14
+/* Share of what is accepted that such a guess may miss: a pass would do better. */
+#define GUESS_ACCEPT 0.1
 
 enum {
     ROUNDS_GUESS = 12,  /* of the active set from the caller's modes */
@@ -121,14 +123,16 @@ static int group_is_exact(const crm_island *s, int q, const double *defect)
 static int guess_is_exact(crm_island *s)
 {
     const double r = crm_island_residual(s, s->x); /* leaves the sizes, and the defect in rest */
-    if (!(r <= s->accept)) return 0;
+    if (!(r <= GUESS_ACCEPT * s->accept)) return 0;
     for (int q = 0; q < s->ng; q++) {
         if (!group_is_exact(s, q, s->rest.z)) return 0;
     }
     for (int k = 0; k < s->nc; k++) {
-        if (exact_mode(s, k) < 0) return 0;
+        const int mode = exact_mode(s, k);
+        if (mode < 0) return 0;
+        s->base_mode[k] = (unsigned char)mode;
     }
-    for (int k = 0; k < s->nc; k++) s->mode[k] = (unsigned char)exact_mode(s, k);
+    memcpy(s->mode, s->base_mode, (size_t)s->nc);
     return crm_island_offer(s, s->x, r);
 }
 
