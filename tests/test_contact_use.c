@@ -208,6 +208,40 @@ static void order_of_contacts_does_not_matter(void **state)
 /* A solution as the guess: of the same problem, and of one with other right-hand sides, it takes no
  * factorization, for the last one is kept; of a neighbor one, also where many impulses give the
  * same motion; modes alone take one where they fit the impulses nearest to zero. */
+/* Passes at moved constants lead where a solve leads, by back-substitutions alone; from impulses
+ * alone, too. */
+static void passes_follow_the_constants(void **state)
+{
+    (void)state;
+    rng r = {7};
+    for (uint64_t seed = 1; seed <= 20; seed++) {
+        contact_case c = contact_mixed(seed, 6);
+        carom_contact_solver *s;
+        int n = 0;
+        assert_int_equal(carom_contact_create(NULL, NULL, &s), CAROM_OK);
+        assert_int_equal(carom_contact_solve(s, &c.p, 0, &c.x, NULL), CAROM_OK);
+        /* of joints: a contact that touches without pressing would change its mode */
+        for (int k = 0; k < c.p.n_joint_rows; k++) c.ce[k] += 1e-6 * rng_unit(&r);
+        contact_case other = contact_case_copy(&c);
+        for (int start = 0; start < 2; start++) {
+            if (start) assert_int_equal(carom_contact_start(s, &c.p, &c.x), CAROM_OK);
+            for (int k = 0; k < 3; k++) {
+                assert_int_equal(carom_contact_pass(s, &c.p, &c.x, &n), CAROM_OK);
+                if (k) assert_int_equal(n, 0);
+            }
+            assert_at_most("residual", carom_contact_measure(s, &c.p, &c.x), 1e-11);
+            assert_true(carom_contact_measure(s, &c.p, &c.x) == carom_contact_residual(&c.p, &c.x));
+            assert_at_most("own residual", contact_case_residual(&c), 1e-11);
+        }
+        assert_int_equal(carom_contact_solve(s, &other.p, CAROM_GUESS_MODES, &other.x, NULL),
+                         CAROM_OK);
+        for (int i = 0; i < 3 * c.p.n_bodies; i++) assert_near(c.x.v[i], other.x.v[i], 1e-10);
+        carom_contact_destroy(s);
+        contact_case_free(&c);
+        contact_case_free(&other);
+    }
+}
+
 static void good_guess_takes_one_factorization(void **state)
 {
     (void)state;
@@ -416,6 +450,7 @@ int main(void)
         cmocka_unit_test(repeats_bit_for_bit),
         cmocka_unit_test(threads_do_not_matter),
         cmocka_unit_test(order_of_contacts_does_not_matter),
+        cmocka_unit_test(passes_follow_the_constants),
         cmocka_unit_test(good_guess_takes_one_factorization),
         cmocka_unit_test(tall_stack_at_rest_costs_nothing),
         cmocka_unit_test(no_allocation_in_steady_state),

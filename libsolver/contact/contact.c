@@ -129,14 +129,19 @@ static carom_status judge(const carom_contact_settings *s, double residual)
     return residual <= s->inexact ? CAROM_INEXACT : CAROM_E_NO_SOLUTION;
 }
 
+carom_status crm_reserve_residual(carom_contact_solver *c, const carom_contact_problem *p)
+{
+    return crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, 6 * p->n_bodies + 1,
+                       sizeof(double));
+}
+
 static carom_status solve(carom_contact_solver *c, const carom_contact_problem *p, int use_guess,
                           carom_contact_solution *x, carom_contact_stats *stats)
 {
     carom_status s = crm_contact_check(p);
     if (s >= 0) s = crm_solution_check(p, x);
     if (s < 0) return s;
-    s = crm_reserve(&c->memory, (void **)&c->scratch, &c->scratch_max, 6 * p->n_bodies + 1,
-                    sizeof(double));
+    s = crm_reserve_residual(c, p);
     if (s >= 0) s = crm_solver_prepare(c, p);
     if (s < 0) return s;
     const double speed = crm_contact_speed(p);

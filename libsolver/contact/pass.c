@@ -1,3 +1,4 @@
+#include "libsolver/contact/check.h"
 #include "libsolver/contact/ladder/ladder.h"
 #include "libsolver/contact/residual.h"
 #include "libsolver/contact/solver.h"
@@ -66,6 +67,40 @@ static void add_step(const crm_system *y, const crm_graph *g, const carom_contac
     }
 }
 
+/* v = u + W J'l. */
+static void follow_impulses(const carom_contact_problem *p, carom_contact_solution *x)
+{
+    const int n = 3 * p->n_bodies;
+    memset(x->v, 0, (size_t)n * sizeof(double));
+    for (int k = 0; k < p->n_contacts; k++) {
+        const int *body = p->contact_body + 2 * k;
+        crm_row_add(x->v, p->jn + 6 * k, body, x->ln[k]);
+        if (crm_has_friction(p, k)) crm_row_add(x->v, p->jt + 6 * k, body, x->lt[k]);
+    }
+    for (int r = 0; r < p->n_joint_rows; r++) {
+        crm_row_add(x->v, p->je + 6 * r, p->joint_body + 2 * r, x->le[r]);
+    }
+    for (int i = 0; i < n; i++) x->v[i] = p->u[i] + p->inv_mass[i] * x->v[i];
+}
+
+carom_status carom_contact_start(carom_contact_solver *solver, const carom_contact_problem *problem,
+                                 carom_contact_solution *x)
+{
+    const carom_contact_problem *p = problem;
+    if (!solver) return CAROM_E_ARGUMENT;
+    carom_status e = crm_contact_check(p);
+    if (e >= 0) e = crm_solution_check(p, x);
+    if (e >= 0 && !crm_modes_valid(p, x->mode)) e = CAROM_E_ARGUMENT;
+    if (e >= 0) e = crm_solver_prepare(solver, p);
+    if (e < 0) return e;
+    for (int i = 0; i < solver->graph.n_islands; i++) {
+        crm_system_gather(&solver->system, &solver->graph, p, i);
+        crm_system_begin(&solver->system, i);
+    }
+    follow_impulses(p, x);
+    return CAROM_OK;
+}
+
 carom_status carom_contact_pass(carom_contact_solver *solver, const carom_contact_problem *problem,
                                 carom_contact_solution *x, int *factorizations)
 {
@@ -86,4 +121,11 @@ carom_status carom_contact_pass(carom_contact_solver *solver, const carom_contac
     }
     if (factorizations) *factorizations = n;
     return CAROM_OK;
+}
+
+double carom_contact_measure(carom_contact_solver *solver, const carom_contact_problem *problem,
+                             const carom_contact_solution *x)
+{
+    if (!solver || !problem || !x || crm_reserve_residual(solver, problem) < 0) return HUGE_VAL;
+    return crm_contact_residual(problem, x, crm_contact_speed(problem), solver->scratch);
 }

@@ -21,5 +21,7 @@ struct carom_contact_solver {
 
 /* Graph, pattern and room for the problem. */
 carom_status crm_solver_prepare(carom_contact_solver *c, const carom_contact_problem *p);
+/* Room in scratch for the residual (22). */
+carom_status crm_reserve_residual(carom_contact_solver *c, const carom_contact_problem *p);
 
 #endif

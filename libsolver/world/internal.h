@@ -221,10 +221,15 @@ void crm_rows_free(carom_world *w);
 
 /* solve.c */
 /* Solves c, whose right-hand sides and pose are set; the result and modes go to c. */
-/* A pass towards the equations of c's modes from the solve that has just run, at other cn, ct, ce;
- * not for islands with motors. */
-carom_status crm_solve_pass(carom_world *w, const crm_substep *s, crm_solve *c);
 carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use_guess);
+/* Of joints alone, without motors: the velocity that the guess gives, and the right-hand sides that
+ * it solves; passes may follow. */
+carom_status crm_solve_guess(carom_world *w, crm_substep *s, crm_solve *c);
+/* Whether what passes led to is a solution, by its residual. */
+int crm_solve_holds(carom_world *w, const crm_substep *s, crm_solve *c);
+/* A pass towards the equations of c's modes from what has just run, at other cn, ct, ce; not for
+ * islands with motors. */
+carom_status crm_solve_pass(carom_world *w, const crm_substep *s, crm_solve *c);
 /* The same for a problem with restitution, unless plastic; where that leaves no solution, without,
  * then without friction, then with as much approach as must be. */
 carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, int plastic);

@@ -14,6 +14,10 @@ enum { PATIENT = 25, MAX_NEWTON = 40, MAX_VAIN = 10 };
 static const double LOOSE = 1e-9;
 static const double FAR = 1e2;
 static const double HALF = 0.5;
+/* A guess that leaves joints farther open [L], or turns a body by more than without forces [1], may
+ * lead to another solution. */
+static const double GUESS_OPEN = 1e-2;
+static const double GUESS_TURN = 0.1;
 /* Speeds beyond this are no error of second order but another solution [what forces can give]. */
 static const double GAIN = 1.5;
 /* From here on it is said: the step is long for what turns in it. */
@@ -170,30 +174,62 @@ static void next_iterate(carom_world *w, const crm_substep *s, crm_solve *c, crm
     take_sides(w, s, asked, a->point, c);
 }
 
-/* The iteration of stage 1, rows and first right-hand sides in place.  Between a first and a last
- * solve, which decide on the modes, passes follow the right-hand sides while they gain by HALF. */
+/* How an iteration finds the velocity of its right-hand sides: by the guess alone, a pass, a solve.
+ */
+typedef enum newton_kind { NEWTON_GUESS, NEWTON_PASS, NEWTON_SOLVE } newton_kind;
+
+static carom_status find_velocity(carom_world *w, crm_substep *s, crm_solve *c, newton_kind kind)
+{
+    if (kind == NEWTON_GUESS) return crm_solve_guess(w, s, c);
+    return kind == NEWTON_PASS ? crm_solve_pass(w, s, c) : crm_solve_run(w, s, c, 1);
+}
+
+static int guess_is_near(const carom_world *w, const crm_substep *s, const crm_solve *c,
+                         double open)
+{
+    double turn = 0;
+    for (int k = 0; k < w->island->n_bodies; k++) {
+        const int b = w->island->bodies[k];
+        turn = fmax(turn, s->h * fabs(c->v[3 * b] - s->v0[3 * b]));
+    }
+    return open <= GUESS_OPEN * w->length && turn <= GUESS_TURN;
+}
+
+/* The iteration of stage 1, rows and first right-hand sides in place.  Joints alone need no solve
+ * that decides on modes: they begin with their guess, passes follow the right-hand sides while they
+ * gain by HALF, and the residual ends them. */
 static carom_status iterate(carom_world *w, crm_substep *s, crm_solve *c)
 {
     const double tol = NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
     const double loose = LOOSE * w->length;
+    const int bound = s->n_contacts || w->island->n_rows;
+    const int joints_alone = bound && !s->n_contacts && !w->island->n_driven;
+    newton_kind kind = joints_alone ? NEWTON_GUESS : NEWTON_SOLVE;
     double best = HUGE_VAL;
     int vain = 0;
-    int solved = 1; /* by this iteration, not passed */
     for (int k = 0; k < MAX_NEWTON && vain <= MAX_VAIN && w->effort < CRM_WORN; k++) {
-        const carom_status e = solved ? crm_solve_run(w, s, c, 1) : crm_solve_pass(w, s, c);
+        const carom_status e = find_velocity(w, s, c, kind);
         if (e < 0) return e;
         end_pose(w, s, c);
-        if (!s->n_contacts && !w->island->n_rows) return CAROM_OK;
+        if (!bound) return CAROM_OK;
         const double moved = next_sides(w, s, c, &s->solve[1]);
-        const int near = moved <= tol || (k >= PATIENT && moved <= loose);
         const int lost = !(moved < FAR * w->length);
-        if (solved && near) return moved <= tol ? CAROM_OK : CAROM_INEXACT;
-        if (solved && lost) return CAROM_E_NO_SOLUTION;
-        const int gains = moved < HALF * best;
+        if (lost && kind == NEWTON_SOLVE) return CAROM_E_NO_SOLUTION;
+        if (lost || (kind == NEWTON_GUESS && !guess_is_near(w, s, c, moved))) {
+            first_sides(w, s, c);
+            crm_anderson_forget(&w->anderson);
+            kind = NEWTON_SOLVE;
+            continue;
+        }
+        const int near = moved <= tol || (k >= PATIENT && moved <= loose);
+        if (near && (kind == NEWTON_SOLVE || crm_solve_holds(w, s, c))) {
+            return moved <= tol ? CAROM_OK : CAROM_INEXACT;
+        }
+        const int gains = k == 0 || moved < HALF * best;
+        kind = joints_alone && gains && !near ? NEWTON_PASS : NEWTON_SOLVE;
         vain = moved < best ? 0 : vain + 1;
         best = fmin(best, moved);
-        solved = near || lost || (k > 0 && !gains) || w->island->n_driven;
-        if (!near && !lost) next_iterate(w, s, c, &s->solve[1]);
+        if (!near) next_iterate(w, s, c, &s->solve[1]);
     }
     return CAROM_E_NO_SOLUTION;
 }

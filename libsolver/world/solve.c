@@ -11,6 +11,8 @@ enum { MAX_SETTLINGS = 20 };
  * many times. */
 static const double GIVE_WAY = 1e-3;
 enum { MAX_WAYS = 32 };
+/* A point that passes led to may miss this share of what is accepted: a solve would do better. */
+static const double HOLDS = 0.1;
 
 double crm_rounding(const carom_world *w)
 {
@@ -122,12 +124,46 @@ carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use
     return e;
 }
 
+/* J u + c of one row, u in the order of the island. */
+static double row_value(const double row[6], const int body[2], const double *u, double c)
+{
+    for (int side = 0; side < 2; side++) {
+        if (body[side] < 0) continue;
+        for (int i = 0; i < 3; i++) c += row[3 * side + i] * u[3 * body[side] + i];
+    }
+    return c;
+}
+
+carom_status crm_solve_guess(carom_world *w, crm_substep *s, crm_solve *c)
+{
+    const carom_contact_problem p = crm_problem(w, s, c);
+    carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
+    const carom_status e = carom_contact_start(crm_solver(w), &p, &x);
+    if (e < 0) return e;
+    for (int r = 0; r < p.n_joint_rows; r++) {
+        c->ce[r] = -row_value(&p.je[6 * r], &p.joint_body[2 * r], w->rows.v, 0);
+    }
+    s->degenerate = 0;
+    take_velocities(w, w->rows.v, c->v);
+    return CAROM_OK;
+}
+
+int crm_solve_holds(carom_world *w, const crm_substep *s, crm_solve *c)
+{
+    const carom_contact_problem p = crm_problem(w, s, c);
+    const carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
+    const double r = carom_contact_measure(crm_solver(w), &p, &x);
+    if (!(r <= HOLDS * w->settings.accept)) return 0;
+    w->stats->residual = fmax(w->stats->residual, r);
+    return 1;
+}
+
 carom_status crm_solve_pass(carom_world *w, const crm_substep *s, crm_solve *c)
 {
     const carom_contact_problem p = crm_problem(w, s, c);
     carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
     int n = 0;
-    const carom_status e = carom_contact_pass(s->keep ? w->solver : crm_solver(w), &p, &x, &n);
+    const carom_status e = carom_contact_pass(crm_solver(w), &p, &x, &n);
     w->effort += n;
     w->stats->factorizations += n;
     take_velocities(w, w->rows.v, c->v);
@@ -137,16 +173,6 @@ carom_status crm_solve_pass(carom_world *w, const crm_substep *s, crm_solve *c)
 static int unsolved(carom_status e)
 {
     return e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION;
-}
-
-/* J u + c of one row, u in the order of the island. */
-static double row_value(const double row[6], const int body[2], const double *u, double c)
-{
-    for (int side = 0; side < 2; side++) {
-        if (body[side] < 0) continue;
-        for (int i = 0; i < 3; i++) c += row[3 * side + i] * u[3 * body[side] + i];
-    }
-    return c;
 }
 
 /* The last solve was infeasible by y: moves its right-hand sides by the least that y allows; 0

@@ -128,13 +128,20 @@ CAROM_API carom_status carom_contact_modes(carom_contact_solver *solver,
                                            const carom_contact_problem *problem,
                                            carom_contact_solution *x);
 
+/* x->v <- u + W J'l of the impulses in x, and the solver made ready for carom_contact_pass: for
+ * those whose impulses and modes are near the solution.  No factorization. */
+CAROM_API carom_status carom_contact_start(carom_contact_solver *solver,
+                                           const carom_contact_problem *problem,
+                                           carom_contact_solution *x);
+
 /* One pass of the proximal iteration towards the equations of the modes in x->mode, from x, right
- * after a carom_contact_solve, _modes or _pass with this solver whose result x is: of the problem
- * nothing may have changed but cn, ct and ce.  v, ln, lt and le move; v - u - W J'l stays.  Rows that
- * hold are then met to some 1e-10 of what they missed, also where they depend on each other.  For
- * Newton's method on what moves c: neither signs nor a residual are looked at, so end with a solve.
- * A back-substitution; a factorization where the solve needed none (*factorizations, may be NULL).
- * No check but for CAROM_E_ARGUMENT before the first solve. */
+ * after a carom_contact_solve, _modes, _start or _pass with this solver, x being its result: of the
+ * problem nothing may have changed but cn, ct and ce.  v, ln, lt and le move; v - u - W J'l stays.
+ * Rows that hold are then met to some 1e-10 of what they missed, also where they depend on each
+ * other.  For Newton's method on what moves c: neither signs nor a residual are looked at, so end
+ * with carom_contact_residual or a solve. A back-substitution; a factorization where the solve
+ * needed none (*factorizations, may be NULL). No check but for CAROM_E_ARGUMENT before the first
+ * solve. */
 CAROM_API carom_status carom_contact_pass(carom_contact_solver *solver,
                                           const carom_contact_problem *problem,
                                           carom_contact_solution *x, int *factorizations);
@@ -149,6 +156,11 @@ CAROM_API carom_status carom_contact_certificate(const carom_contact_solver *sol
  * memory exhausted (two numbers per velocity are taken from malloc for the call). */
 CAROM_API double carom_contact_residual(const carom_contact_problem *problem,
                                         const carom_contact_solution *x);
+
+/* The same with the solver's memory. */
+CAROM_API double carom_contact_measure(carom_contact_solver *solver,
+                                       const carom_contact_problem *problem,
+                                       const carom_contact_solution *x);
 
 /* Cotangents of the problem's data: same shapes as in carom_contact_problem; NULL: not wanted. */
 typedef struct carom_contact_bars {
