@@ -222,11 +222,12 @@ void crm_rows_free(carom_world *w);
 /* solve.c */
 /* Solves c, whose right-hand sides and pose are set; the result and modes go to c. */
 carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use_guess);
-/* Of joints alone, without motors: the velocity that the guess gives, and the right-hand sides that
- * it solves; passes may follow. */
+/* Of joints alone, without motors: the velocity that the guess gives; passes may follow. */
 carom_status crm_solve_guess(carom_world *w, crm_substep *s, crm_solve *c);
-/* Whether what passes led to is a solution, by its residual. */
-int crm_solve_holds(carom_world *w, const crm_substep *s, crm_solve *c);
+/* Whether what passes led to is a solution: its residual is at most `most`. */
+int crm_solve_holds(carom_world *w, const crm_substep *s, crm_solve *c, double most);
+/* crm_solve_run of joints alone, without motors, by passes from the guess where these suffice. */
+carom_status crm_solve_joints(carom_world *w, crm_substep *s, crm_solve *c);
 /* A pass towards the equations of c's modes from what has just run, at other cn, ct, ce; not for
  * islands with motors. */
 carom_status crm_solve_pass(carom_world *w, const crm_substep *s, crm_solve *c);

@@ -18,6 +18,8 @@ static const double HALF = 0.5;
  * lead to another solution. */
 static const double GUESS_OPEN = 1e-2;
 static const double GUESS_TURN = 0.1;
+/* What passes led to may miss this share of what is accepted: a solve would do better. */
+static const double HOLDS = 0.1;
 /* Speeds beyond this are no error of second order but another solution [what forces can give]. */
 static const double GAIN = 1.5;
 /* From here on it is said: the step is long for what turns in it. */
@@ -174,14 +176,35 @@ static void next_iterate(carom_world *w, const crm_substep *s, crm_solve *c, crm
     take_sides(w, s, asked, a->point, c);
 }
 
+/* Their modes are known: no signs, no friction, no motors. */
+static int has_joints_alone(const carom_world *w, const crm_substep *s)
+{
+    return !s->n_contacts && w->island->n_rows && !w->island->n_driven;
+}
+
 /* How an iteration finds the velocity of its right-hand sides: by the guess alone, a pass, a solve.
  */
 typedef enum newton_kind { NEWTON_GUESS, NEWTON_PASS, NEWTON_SOLVE } newton_kind;
 
+/* The right-hand sides whose solution c->v is. */
+static void sides_of_velocity(const carom_world *w, crm_solve *c)
+{
+    int row = 0;
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        for (int i = 0; i < j->n_rows; i++, row++) {
+            c->ce[row] = -crm_row_dot(&w->rows.je[6 * row], c->v, j->body_a, j->body_b);
+        }
+    }
+}
+
 static carom_status find_velocity(carom_world *w, crm_substep *s, crm_solve *c, newton_kind kind)
 {
-    if (kind == NEWTON_GUESS) return crm_solve_guess(w, s, c);
-    return kind == NEWTON_PASS ? crm_solve_pass(w, s, c) : crm_solve_run(w, s, c, 1);
+    if (kind == NEWTON_SOLVE) return crm_solve_run(w, s, c, 1);
+    if (kind == NEWTON_PASS) return crm_solve_pass(w, s, c);
+    const carom_status e = crm_solve_guess(w, s, c);
+    sides_of_velocity(w, c);
+    return e;
 }
 
 static int guess_is_near(const carom_world *w, const crm_substep *s, const crm_solve *c,
@@ -203,7 +226,7 @@ static carom_status iterate(carom_world *w, crm_substep *s, crm_solve *c)
     const double tol = NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
     const double loose = LOOSE * w->length;
     const int bound = s->n_contacts || w->island->n_rows;
-    const int joints_alone = bound && !s->n_contacts && !w->island->n_driven;
+    const int joints_alone = has_joints_alone(w, s);
     newton_kind kind = joints_alone ? NEWTON_GUESS : NEWTON_SOLVE;
     double best = HUGE_VAL;
     int vain = 0;
@@ -222,7 +245,8 @@ static carom_status iterate(carom_world *w, crm_substep *s, crm_solve *c)
             continue;
         }
         const int near = moved <= tol || (k >= PATIENT && moved <= loose);
-        if (near && (kind == NEWTON_SOLVE || crm_solve_holds(w, s, c))) {
+        if (near &&
+            (kind == NEWTON_SOLVE || crm_solve_holds(w, s, c, HOLDS * w->settings.accept))) {
             return moved <= tol ? CAROM_OK : CAROM_INEXACT;
         }
         const int gains = k == 0 || moved < HALF * best;
@@ -332,7 +356,9 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
     }
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
     crm_motor_sides(w, c);
-    const carom_status e = sees ? iterate_speed(w, s, c) : crm_solve_run(w, s, c, 1);
+    const carom_status e = sees                     ? iterate_speed(w, s, c)
+                           : has_joints_alone(w, s) ? crm_solve_joints(w, s, c)
+                                                    : crm_solve_run(w, s, c, 1);
     if (e < 0) return e;
     crm_copy(w, s->v1, c->v);
     return sees ? e : CAROM_OK;

@@ -11,8 +11,9 @@ enum { MAX_SETTLINGS = 20 };
  * many times. */
 static const double GIVE_WAY = 1e-3;
 enum { MAX_WAYS = 32 };
-/* A point that passes led to may miss this share of what is accepted: a solve would do better. */
-static const double HOLDS = 0.1;
+/* Passes from a guess are enough when they lead to a residual of some rounding [1]. */
+enum { MAX_PASSES = 2 };
+static const double EXACT = 1e-13;
 
 double crm_rounding(const carom_world *w)
 {
@@ -140,20 +141,17 @@ carom_status crm_solve_guess(carom_world *w, crm_substep *s, crm_solve *c)
     carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
     const carom_status e = carom_contact_start(crm_solver(w), &p, &x);
     if (e < 0) return e;
-    for (int r = 0; r < p.n_joint_rows; r++) {
-        c->ce[r] = -row_value(&p.je[6 * r], &p.joint_body[2 * r], w->rows.v, 0);
-    }
     s->degenerate = 0;
     take_velocities(w, w->rows.v, c->v);
     return CAROM_OK;
 }
 
-int crm_solve_holds(carom_world *w, const crm_substep *s, crm_solve *c)
+int crm_solve_holds(carom_world *w, const crm_substep *s, crm_solve *c, double most)
 {
     const carom_contact_problem p = crm_problem(w, s, c);
     const carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
     const double r = carom_contact_measure(crm_solver(w), &p, &x);
-    if (!(r <= HOLDS * w->settings.accept)) return 0;
+    if (!(r <= most)) return 0;
     w->stats->residual = fmax(w->stats->residual, r);
     return 1;
 }
@@ -168,6 +166,14 @@ carom_status crm_solve_pass(carom_world *w, const crm_substep *s, crm_solve *c)
     w->stats->factorizations += n;
     take_velocities(w, w->rows.v, c->v);
     return e;
+}
+
+carom_status crm_solve_joints(carom_world *w, crm_substep *s, crm_solve *c)
+{
+    carom_status e = crm_solve_guess(w, s, c);
+    for (int k = 0; e >= 0 && k < MAX_PASSES; k++) e = crm_solve_pass(w, s, c);
+    if (e < 0 || crm_solve_holds(w, s, c, EXACT)) return e;
+    return crm_solve_run(w, s, c, 1);
 }
 
 static int unsolved(carom_status e)
