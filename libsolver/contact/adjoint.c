@@ -13,11 +13,10 @@
 #define WIDE 10
 enum { EXTRA = 2 };
 
-/* The equations at the active set, with B = [J_n' + s mu J_t' (slip), J_t' (stick), J_e'] and
- * C = [J_n; J_t (stick); J_e], are  v - u - W B l = 0,  C v + c = 0.  Their adjoint is
- *   p + C' q = g,   B' W p = 0
- * and gives, with f = B l:  u_bar = p,  W_bar = p f,  c_bar = -q,  B_bar = (W p) l',
- * C_bar = -q v'.  This is (30) with d_v = W p, d_l = q. */
+/* The equations at the active set (on the central path as said in smooth.c), with B = [J_n' + s mu
+ * J_t' (slip), J_t' (stick), J_e'] and C = [J_n; J_t (stick); J_e], are  v - u - W B l = 0,  C v +
+ * c = 0.  Their adjoint is p + C' q = g,   B' W p = 0 and gives, with f = B l:  u_bar = p,  W_bar =
+ * p f,  c_bar = -q,  B_bar = (W p) l', C_bar = -q v'.  This is (30) with d_v = W p, d_l = q. */
 typedef struct adjoint {
     double *p;  /* 3 n_bodies */
     double *cn; /* n_contacts: -q */
@@ -35,11 +34,6 @@ static adjoint carve(double *scratch, const carom_contact_problem *p)
     return a;
 }
 
-static int sticks(const crm_island *s, int k)
-{
-    return s->mode[k] == CAROM_STICK && s->contact[k].mu > 0;
-}
-
 /* B' p of contact k. */
 static void project(const crm_island *s, int k, const double *p, double *bn, double *bt)
 {
@@ -50,7 +44,7 @@ static void project(const crm_island *s, int k, const double *p, double *bn, dou
     *bn = crm_dot(c->n, c->a, c->b, p);
     if (!(c->mu > 0)) return;
     const double t = crm_dot(c->t, c->a, c->b, p);
-    if (sticks(s, k))
+    if (crm_feels_slip(s, k))
         *bt = t;
     else
         *bn += crm_slip_sign(s->mode[k]) * c->mu * t;
@@ -62,7 +56,7 @@ static void spread(const crm_island *s, int k, double factor, double qn, double 
     const crm_contact *c = &s->contact[k];
     if (s->mode[k] == CAROM_SEPARATED) return;
     crm_add(z, c->n, c->a, c->b, factor * qn);
-    if (sticks(s, k)) crm_add(z, c->t, c->a, c->b, factor * qt);
+    if (crm_feels_slip(s, k)) crm_add(z, c->t, c->a, c->b, factor * qt);
 }
 
 /* The row times p, 0 where that is rounding of its terms: divided by the compliance it would make q
@@ -82,6 +76,15 @@ static double past_rounding(const double *row, int a, int b, const double *p)
     return fabs(sum) <= DBL_EPSILON * size ? 0 : sum;
 }
 
+/* B' p - V' q of contact k on the central path, V its compliance, into s->rhs. */
+static void smooth_defects(crm_island *s, int k)
+{
+    const crm_contact *c = &s->contact[k];
+    const crm_response v = crm_smooth_compliance(s, k);
+    s->rhs.n[k] = crm_dot(c->n, c->a, c->b, s->x.z) - v.nn * s->x.n[k] - v.tn * s->x.t[k];
+    s->rhs.t[k] = c->mu > 0 ? crm_dot(c->t, c->a, c->b, s->x.z) - v.tt * s->x.t[k] : 0;
+}
+
 /* B' p of contact k into s->rhs. */
 static void row_defects(crm_island *s, int k)
 {
@@ -89,10 +92,14 @@ static void row_defects(crm_island *s, int k)
     s->rhs.n[k] = 0;
     s->rhs.t[k] = 0;
     if (s->mode[k] == CAROM_SEPARATED) return;
+    if (s->mode[k] == CAROM_SMOOTHED) {
+        smooth_defects(s, k);
+        return;
+    }
     s->rhs.n[k] = past_rounding(c->n, c->a, c->b, s->x.z);
     if (!(c->mu > 0)) return;
     const double t = past_rounding(c->t, c->a, c->b, s->x.z);
-    if (sticks(s, k)) {
+    if (crm_feels_slip(s, k)) {
         s->rhs.t[k] = t;
     } else {
         s->rhs.n[k] += crm_slip_sign(s->mode[k]) * c->mu * t;
@@ -122,22 +129,34 @@ static double find_defect(crm_island *s, const double *g)
     return e;
 }
 
+/* What contact k answers to (r_n, r_t): W' r, with W = 1 / compliance of the active rows. */
+static void answer(const crm_island *s, int k, double compliance, double rn, double rt, double *qn,
+                   double *qt)
+{
+    const crm_response *w = &s->response[k];
+    const int smooth = s->mode[k] == CAROM_SMOOTHED;
+    *qn = smooth ? w->nn * rn + w->tn * rt : rn / compliance;
+    *qt = smooth ? w->tt * rt : rt / compliance;
+}
+
 /* One proximal pass: dp + C' dq = rhs.z, -B' dp + delta dq = rhs.n, rhs.t; s->x += (dp, dq). */
 static void improve(crm_island *s, double compliance)
 {
     double *z = s->step.z;
     memcpy(z, s->rhs.z, 3 * (size_t)(s->nb + s->ng) * sizeof(double));
     for (int k = 0; k < s->nc; k++) {
+        double qn;
+        double qt;
         if (s->rhs.n[k] == 0 && s->rhs.t[k] == 0) continue;
-        spread(s, k, -1 / compliance, s->rhs.n[k], s->rhs.t[k], z);
+        answer(s, k, compliance, s->rhs.n[k], s->rhs.t[k], &qn, &qt);
+        spread(s, k, -1, qn, qt, z);
     }
     crm_island_solve_transposed(s, z);
     for (int k = 0; k < s->nc; k++) {
         double bn;
         double bt;
         project(s, k, z, &bn, &bt);
-        s->step.n[k] = (s->rhs.n[k] + bn) / compliance;
-        s->step.t[k] = (s->rhs.t[k] + bt) / compliance;
+        answer(s, k, compliance, s->rhs.n[k] + bn, s->rhs.t[k] + bt, &s->step.n[k], &s->step.t[k]);
     }
     crm_vec_add(s, s->x, 1, s->step);
 }
@@ -218,7 +237,7 @@ static void solve_island(carom_contact_solver *c, const double *v_bar, double to
     for (int k = 0; k < s->nc; k++) {
         const int slot = g->contact_ptr[island] + k;
         a->cn[g->contact_of[slot]] = -y->scale_n[slot] * s->x.n[k];
-        a->ct[g->contact_of[slot]] = sticks(s, k) ? -y->scale_t[slot] * s->x.t[k] : 0;
+        a->ct[g->contact_of[slot]] = crm_feels_slip(s, k) ? -y->scale_t[slot] * s->x.t[k] : 0;
     }
     for (int q = 0; q < s->ng; q++) {
         const int slot = g->group_ptr[island] + q;
@@ -274,14 +293,15 @@ static void row_bar(const carom_contact_problem *p, const adjoint *a, const doub
 static double mu_bar(const carom_contact_problem *p, const carom_contact_solution *x,
                      const adjoint *a, int k)
 {
-    const double sign = crm_has_friction(p, k) ? crm_slip_sign(x->mode[k]) : 0;
+    if (!crm_has_friction(p, k)) return 0;
+    const double share = crm_friction_share(x->mode[k], p->mu[k], x->ln[k], x->lt[k]);
     double sum = 0;
-    for (int i = 0; i < 6 && sign != 0; i++) {
+    for (int i = 0; i < 6 && share != 0; i++) {
         const int body = p->contact_body[2 * k + i / 3];
         const int at = 3 * body + i % 3;
         if (body >= 0) sum += p->jt[6 * k + i] * p->inv_mass[at] * a->p[at];
     }
-    return sign * x->ln[k] * sum;
+    return share * x->ln[k] * sum;
 }
 
 /* Of W, J and mu.  f: 3 n_bodies of room. */
@@ -355,7 +375,7 @@ carom_status carom_contact_adjoint(carom_contact_solver *solver,
     if (s >= 0) s = crm_solver_prepare(solver, p);
     for (int i = 0; s >= 0 && i < solver->graph.n_islands; i++) {
         crm_system_gather(&solver->system, &solver->graph, p, i);
-        crm_system_set_modes(&solver->graph, crm_system_begin(&solver->system, i), i, x->mode);
+        crm_take_modes(solver, i, x);
     }
     if (s < 0) return s;
     adjoint a = carve(solver->scratch, p);

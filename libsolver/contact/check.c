@@ -88,7 +88,7 @@ carom_status crm_solution_check(const carom_contact_problem *p, const carom_cont
 int crm_modes_valid(const carom_contact_problem *p, const unsigned char *mode)
 {
     for (int k = 0; k < p->n_contacts; k++) {
-        if (mode[k] > CAROM_SLIP_PLUS) return 0;
+        if (mode[k] > CAROM_SLIP_PLUS && mode[k] != CAROM_SMOOTHED) return 0;
     }
     return 1;
 }

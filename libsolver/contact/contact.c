@@ -104,8 +104,8 @@ static void write_rest(const crm_graph *g, const carom_contact_problem *p,
     for (int r = 0; r < p->n_joint_rows; r++) x->le[r] = 0;
 }
 
-static void write_solution(carom_contact_solver *c, const carom_contact_problem *p,
-                           carom_contact_solution *x)
+void crm_solver_write(carom_contact_solver *c, const carom_contact_problem *p,
+                      carom_contact_solution *x)
 {
     write_rest(&c->graph, p, x);
     for (int i = 0; i < c->graph.n_islands; i++) {
@@ -149,7 +149,7 @@ static carom_status solve(carom_contact_solver *c, const carom_contact_problem *
     if (s >= 0) count(c, stats);
     if (s >= 0) s = crm_islands_solve(c, p, use_guess, x, stats);
     if (s < 0) return s;
-    write_solution(c, p, x);
+    crm_solver_write(c, p, x);
     stats->residual = crm_contact_residual(p, x, speed, c->scratch);
     return judge(&c->settings, stats->residual);
 }

@@ -103,6 +103,7 @@ typedef struct crm_island {
     double best_residual;
     int fresh;         /* an and ut belong to best */
     double compliance; /* of the last equations of modes */
+    double kappa;      /* of contacts on the central path, in the island's units */
     double accept;
     double inexact; /* a point this good ends the restarts early */
     int max_iterations;
@@ -159,6 +160,12 @@ void crm_island_solve_transposed(crm_island *s, double *x);
 /* step <- solution of  z - J' l = r.z (bodies),  l = W (r - J z) per contact with the responses W
  * factored,  J_e z + delta l_e = r.z (groups). */
 void crm_island_reduce(crm_island *s, crm_vec r, crm_vec step);
+
+/* The contact has an equation along its tangent: it sticks, or is on the central path. */
+static inline int crm_feels_slip(const crm_island *s, int k)
+{
+    return (s->mode[k] == CAROM_STICK || s->mode[k] == CAROM_SMOOTHED) && s->contact[k].mu > 0;
+}
 
 /* adjoint.c: of z - B l = 0, C z + c = 0 at s->mode: p + C' q = g, B' p = 0, with p in s->x.z and q
  * in s->x.n, s->x.t and behind the bodies, so that <g, z> = -<q, c>, to within tol of the

@@ -12,6 +12,7 @@ struct carom_contact_solver {
     int pattern_valid;
     int system_valid; /* laid out for the pattern */
     crm_system system;
+    double kappa;    /* of the last carom_contact_smooth [J] */
     double *scratch; /* solve: 6 per body; adjoint: see adjoint.c */
     int scratch_max;
     double *certificate; /* y_n, then y_e */
@@ -21,6 +22,11 @@ struct carom_contact_solver {
 
 /* Graph, pattern and room for the problem. */
 carom_status crm_solver_prepare(carom_contact_solver *c, const carom_contact_problem *p);
+/* The best point of every island, and what no island owns. */
+void crm_solver_write(carom_contact_solver *c, const carom_contact_problem *p,
+                      carom_contact_solution *x);
+/* Island i as it begins, with the modes of x, and the responses of those on the central path. */
+void crm_take_modes(carom_contact_solver *c, int island, const carom_contact_solution *x);
 /* Room in scratch for the residual (22). */
 carom_status crm_reserve_residual(carom_contact_solver *c, const carom_contact_problem *p);
 

@@ -320,7 +320,8 @@ void crm_system_set_modes(const crm_graph *g, crm_island *s, int island, const u
 {
     for (int k = 0; k < s->nc; k++) {
         s->mode[k] = mode[g->contact_of[g->contact_ptr[island] + k]];
-        if (!(s->contact[k].mu > 0) && s->mode[k] > CAROM_STICK) s->mode[k] = CAROM_STICK;
+        const int slips = s->mode[k] > CAROM_STICK && s->mode[k] != CAROM_SMOOTHED;
+        if (slips && !(s->contact[k].mu > 0)) s->mode[k] = CAROM_STICK;
     }
 }
 

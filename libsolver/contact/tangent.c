@@ -59,7 +59,8 @@ static void add_changes(const carom_contact_problem *p, const carom_contact_solu
         if (d->jn) crm_row_add(e, d->jn + 6 * k, body, x->ln[k]);
         if (!crm_has_friction(p, k)) continue;
         if (d->jt) crm_row_add(e, d->jt + 6 * k, body, x->lt[k]);
-        const double change = crm_slip_sign(x->mode[k]) * entry(d->mu, k) * x->ln[k];
+        const double share = crm_friction_share(x->mode[k], p->mu[k], x->ln[k], x->lt[k]);
+        const double change = share * entry(d->mu, k) * x->ln[k];
         if (change != 0) crm_row_add(e, p->jt + 6 * k, body, change);
     }
     for (int r = 0; d->je && r < p->n_joint_rows; r++)
@@ -136,7 +137,7 @@ static double row_miss(const crm_island *s)
     double miss = 0;
     for (int k = 0; k < s->nc; k++) {
         const crm_contact *c = &s->contact[k];
-        if (s->mode[k] == CAROM_SEPARATED) continue;
+        if (s->mode[k] == CAROM_SEPARATED || s->mode[k] == CAROM_SMOOTHED) continue;
         miss = fmax(miss, fabs(c->cn + crm_dot(c->n, c->a, c->b, s->x.z)));
         if (s->mode[k] != CAROM_STICK || !(c->mu > 0)) continue;
         miss = fmax(miss, fabs(c->ct + crm_dot(c->t, c->a, c->b, s->x.z)));
@@ -240,7 +241,7 @@ carom_status carom_contact_tangent(carom_contact_solver *solver,
     if (s >= 0) s = crm_solver_prepare(solver, p);
     for (int i = 0; s >= 0 && i < solver->graph.n_islands; i++) {
         crm_system_gather(&solver->system, &solver->graph, p, i);
-        crm_system_set_modes(&solver->graph, crm_system_begin(&solver->system, i), i, x->mode);
+        crm_take_modes(solver, i, x);
     }
     return s < 0 ? s : carom_contact_tangent_again(solver, p, x, direction, dv);
 }

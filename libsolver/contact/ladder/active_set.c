@@ -16,11 +16,51 @@ double crm_slip_sign(unsigned char mode)
     return mode == CAROM_SLIP_PLUS ? 1 : mode == CAROM_SLIP_MINUS ? -1 : 0;
 }
 
+double crm_friction_share(unsigned char mode, double mu, double ln, double lt)
+{
+    if (mode != CAROM_SMOOTHED) return crm_slip_sign(mode);
+    const double bound = mu * ln;
+    const double size = bound * bound + lt * lt;
+    return size > 0 ? 2 * bound * lt / size : 0;
+}
+
+/* (23) with all products kappa: P = p+^2 / kappa, Q = p-^2 / kappa. */
+void crm_set_smooth_responses(crm_island *s)
+{
+    for (int k = 0; k < s->nc; k++) {
+        if (s->mode[k] != CAROM_SMOOTHED) continue;
+        const double mu = s->contact[k].mu;
+        const double ln = s->x.n[k];
+        const double plus = mu * ln + s->x.t[k];
+        const double minus = mu * ln - s->x.t[k];
+        const double nn = ln * ln / s->kappa;
+        const double share = crm_friction_share(s->mode[k], mu, ln, s->x.t[k]);
+        const double squares = plus * plus + minus * minus;
+        s->slack[CRM_SMOOTH_NN][k] = nn;
+        s->slack[CRM_SMOOTH_TN][k] = mu * nn * share;
+        s->slack[CRM_SMOOTH_TT][k] =
+            mu > 0 ? plus * plus * (minus * minus / squares) / s->kappa : 0;
+    }
+}
+
+crm_response crm_smooth_compliance(const crm_island *s, int k)
+{
+    const double nn = s->slack[CRM_SMOOTH_NN][k];
+    const double tn = s->slack[CRM_SMOOTH_TN][k];
+    const double tt = s->slack[CRM_SMOOTH_TT][k];
+    crm_response v = {1 / nn, 0, 0};
+    if (!(s->contact[k].mu > 0)) return v;
+    v.tt = 1 / tt;
+    v.tn = -tn / nn / tt;
+    return v;
+}
+
 /* Multipliers as the modes demand: zero when separated, on the cone when slipping. */
 static void set_multipliers(crm_island *s)
 {
     for (int k = 0; k < s->nc; k++) {
         const double mu = s->contact[k].mu;
+        if (s->mode[k] == CAROM_SMOOTHED) continue;
         if (s->mode[k] == CAROM_SEPARATED) s->x.n[k] = 0;
         if (s->mode[k] == CAROM_SEPARATED || !(mu > 0)) s->x.t[k] = 0;
         if (s->mode[k] > CAROM_STICK) s->x.t[k] = crm_slip_sign(s->mode[k]) * mu * s->x.n[k];
@@ -30,6 +70,11 @@ static void set_multipliers(crm_island *s)
 crm_response crm_mode_response(const crm_island *s, int k, double compliance)
 {
     const double mu = s->contact[k].mu;
+    if (s->mode[k] == CAROM_SMOOTHED) {
+        return (crm_response){.nn = s->slack[CRM_SMOOTH_NN][k],
+                              .tn = s->slack[CRM_SMOOTH_TN][k],
+                              .tt = s->slack[CRM_SMOOTH_TT][k]};
+    }
     const int active = s->mode[k] != CAROM_SEPARATED;
     return (crm_response){
         .nn = active ? 1 / compliance : 0,
@@ -65,10 +110,13 @@ static double find_defect(crm_island *s, int settle)
         s->rhs.n[k] = 0;
         s->rhs.t[k] = 0;
         if (s->mode[k] == CAROM_SEPARATED) continue;
-        s->rhs.n[k] = -(c->cn + crm_dot(c->n, c->a, c->b, s->x.z));
+        const int smooth = s->mode[k] == CAROM_SMOOTHED;
+        const crm_response v = smooth ? crm_smooth_compliance(s, k) : (crm_response){0, 0, 0};
+        s->rhs.n[k] = -(c->cn + crm_dot(c->n, c->a, c->b, s->x.z)) - v.nn * s->x.n[k];
         e = fmax(e, fabs(s->rhs.n[k]));
-        if (s->mode[k] != CAROM_STICK || !(c->mu > 0)) continue;
-        s->rhs.t[k] = -(c->ct + crm_dot(c->t, c->a, c->b, s->x.z));
+        if (!crm_feels_slip(s, k)) continue;
+        s->rhs.t[k] =
+            -(c->ct + crm_dot(c->t, c->a, c->b, s->x.z)) - v.tn * s->x.n[k] - v.tt * s->x.t[k];
         e = fmax(e, fabs(s->rhs.t[k]));
     }
     return e;

@@ -459,3 +459,110 @@ int crm_interior_point(crm_island *s, crm_interior_start start)
     crm_modes_at(s);
     return crm_island_offer(s, s->x, crm_island_residual(s, s->x));
 }
+
+/* --- one point of the central path ---------------------------------------------------------- */
+
+/* Products are kappa and the equations hold to this [1] ... */
+#define ON_PATH   1e-9
+#define PATH_HOLD 1e-13
+/* ... or, where rounding keeps them from that, to this when neither halves any more: near its limit
+ * friction knows mu l_n - l_t only to rounding of l_n. */
+#define NEAR_PATH  1e-3
+#define PATH_LOOSE 1e-9
+/* Responses l_n^2 / kappa beyond this are those of the solution, to all digits [1]. */
+#define STIFFEST 1e16
+
+/* l_t in (-bound, bound) with kappa / (bound + l_t) - kappa / (bound - l_t) = u. */
+static double central_friction(double bound, double u, double kappa)
+{
+    const double ub = u * bound;
+    return -u * bound * bound / (kappa + sqrt(kappa * kappa + ub * ub));
+}
+
+/* Slacks at s->x of which all products are kappa: pressing contacts keep l_n, others a; sticking
+ * ones l_t, others the slip. */
+static void begin_on_path(interior *p, double kappa)
+{
+    crm_island *s = p->s;
+    const double least = sqrt(kappa);
+    p->n_products = 0;
+    p->fraction = 0.95;
+    crm_island_residual(s, s->x); /* leaves a and u */
+    for (int k = 0; k < s->nc; k++) {
+        const int presses = s->x.n[k] >= s->an[k];
+        const double larger = fmax(presses ? s->x.n[k] : s->an[k], least);
+        s->x.n[k] = presses ? larger : kappa / larger;
+        p->a[k] = presses ? kappa / larger : larger;
+        p->n_products++;
+        if (!has_cone(p, k)) continue;
+        p->n_products += 2;
+        const double bound = s->contact[k].mu * s->x.n[k];
+        const double inside = bound - fmin(0.5 * bound, least);
+        s->x.t[k] = s->mode[k] == CAROM_STICK ? fmax(-inside, fmin(inside, s->x.t[k]))
+                                              : central_friction(bound, s->ut[k], kappa);
+        p->wp[k] = kappa / plus(p, s->x, k);
+        p->wm[k] = kappa / minus(p, s->x, k);
+    }
+}
+
+/* Largest of |product / kappa - 1|. */
+static double off_path(const interior *p, double kappa)
+{
+    const crm_vec x = p->s->x;
+    double off = 0;
+    for (int k = 0; k < p->s->nc; k++) {
+        off = fmax(off, fabs(x.n[k] * p->a[k] / kappa - 1));
+        if (!has_cone(p, k)) continue;
+        off = fmax(off, fabs(plus(p, x, k) * p->wp[k] / kappa - 1));
+        off = fmax(off, fabs(minus(p, x, k) * p->wm[k] / kappa - 1));
+    }
+    return off;
+}
+
+static int is_soft(const crm_island *s, double kappa)
+{
+    double largest = 0;
+    for (int k = 0; k < s->nc; k++) largest = fmax(largest, s->x.n[k]);
+    return largest * largest <= STIFFEST * kappa;
+}
+
+/* Newton's method toward equal products, the target falling to kappa. */
+static int follow_path(interior *p, double kappa)
+{
+    crm_island *s = p->s;
+    double last = HUGE_VAL;
+    double last_off = HUGE_VAL;
+    int vain = 0;
+    for (int i = 0; i < s->max_iterations; i++) {
+        if (!(crm_island_residual(s, s->x) < HUGE_VAL)) return 0;
+        const double defect = find_defects(p);
+        const double off = off_path(p, kappa);
+        const int halves = (defect > PATH_HOLD && defect <= 0.5 * last) ||
+                           (off > ON_PATH && off <= 0.5 * last_off);
+        if (off <= ON_PATH && defect <= PATH_HOLD) return is_soft(s, kappa);
+        vain = halves ? 0 : vain + 1;
+        if (off <= NEAR_PATH && defect <= PATH_LOOSE && vain > 2) return is_soft(s, kappa);
+        last = defect;
+        last_off = off;
+        s->iterations++;
+        factor(p);
+        set_target(p, &p->way[0], fmax(kappa, 0.1 * p->mean));
+        find_direction(p, &p->way[0]);
+        const double step = longest_step(p, &p->way[0]);
+        move(p, &p->way[0], step < 1 ? p->fraction * step : 1);
+    }
+    return 0;
+}
+
+int crm_central_path(crm_island *s, double kappa)
+{
+    const crm_interior_start apart = {.fraction = 0.95, .shift = 0.1};
+    interior p;
+    bind(&p, s);
+    crm_vec_copy(s, s->swept, s->x);
+    begin_on_path(&p, kappa);
+    if (!p.n_products || follow_path(&p, kappa)) return 1;
+    crm_vec_copy(s, s->x, s->swept);
+    begin_near(&p, &apart);
+    return follow_path(&p, kappa);
+}

@@ -25,6 +25,15 @@ crm_response crm_mode_response(const crm_island *s, int k, double compliance);
 void crm_set_responses(crm_island *s, double compliance);
 /* Sign of the slip force of a mode, 0 when there is none. */
 double crm_slip_sign(unsigned char mode);
+/* d l_t / d (mu) at fixed velocities, over l_n: that sign, and on the central path what lies
+ * between. */
+double crm_friction_share(unsigned char mode, double mu, double ln, double lt);
+/* Responses of contacts on the central path are kept in slack[0 .. 2]: nn, tn, tt. */
+enum { CRM_SMOOTH_NN, CRM_SMOOTH_TN, CRM_SMOOTH_TT };
+/* ... from their impulses s->x.n, s->x.t and s->kappa. */
+void crm_set_smooth_responses(crm_island *s);
+/* V' q of contact k, V the inverse of such a response; and V l. */
+crm_response crm_smooth_compliance(const crm_island *s, int k);
 /* s->mode <- natural map at s->x. */
 void crm_modes_at(crm_island *s);
 
@@ -40,6 +49,9 @@ typedef struct crm_interior_start {
 
 /* Condensed Mehrotra interior point; leaves its best point in s->x. */
 int crm_interior_point(crm_island *s, crm_interior_start start);
+
+/* From the solution s->x to the point where all products are kappa; 1: reached. */
+int crm_central_path(crm_island *s, double kappa);
 
 /* Projected Gauss-Seidel over contacts and joint groups, from s->x (with z = J' l), where it leaves
  * its point and the natural modes. */

@@ -41,7 +41,8 @@ typedef enum carom_contact_mode {
     CAROM_STICK = 1,      /* also: frictionless and closed */
     CAROM_SLIP_MINUS = 2, /* l_t = -mu l_n */
     CAROM_SLIP_PLUS = 3,  /* l_t = +mu l_n */
-    CAROM_UNKNOWN = 4     /* in a guess only: take the mode of the free motion */
+    CAROM_UNKNOWN = 4,    /* in a guess only: take the mode of the free motion */
+    CAROM_SMOOTHED = 5    /* between the others: a point of carom_contact_smooth */
 } carom_contact_mode;
 
 /* The caller owns the arrays, sized by the problem. */
@@ -161,6 +162,17 @@ CAROM_API double carom_contact_residual(const carom_contact_problem *problem,
 CAROM_API double carom_contact_measure(carom_contact_solver *solver,
                                        const carom_contact_problem *problem,
                                        const carom_contact_solution *x);
+
+/* The point of the central path at kappa [J], EQUATIONS (31), near the solution x, which it
+ * replaces; modes become CAROM_SMOOTHED.  In place of complementarity, with a = J_n v + c_n and J_t
+ * v + c_t = w+ - w-, l_n a = (mu l_n + l_t) w+ = (mu l_n - l_t) w- = kappa,   all six positive: v
+ * is then a smooth function of the data, within O(kappa) of the solution where that has no kinks.
+ * carom_contact_adjoint and _tangent at such an x, with this solver before its next
+ * carom_contact_smooth, are the derivative of that function.
+ * CAROM_E_NO_SOLUTION: kappa is too small (or large) for the digits of this problem; x is kept. */
+CAROM_API carom_status carom_contact_smooth(carom_contact_solver *solver,
+                                            const carom_contact_problem *problem, double kappa,
+                                            carom_contact_solution *x);
 
 /* Cotangents of the problem's data: same shapes as in carom_contact_problem; NULL: not wanted. */
 typedef struct carom_contact_bars {
