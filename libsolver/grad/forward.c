@@ -12,7 +12,10 @@ void crm_begin_solve(crm_forward *f, crm_substep *s, const crm_solve *c)
     f->solution = x;
     const carom_status e =
         crm_kinks_of_solve(w, &f->tape->memory, &f->kinks, f->frame + 1, s, c, &f->problem);
-    if (e < 0) f->kinks_met = e;
+    const carom_status smoothed =
+        crm_smooth_solution(f->tape, &f->problem, c->kind, &f->smoothed, &f->solution, &f->stats);
+    if (e < 0) f->failure = e;
+    if (smoothed < 0) f->failure = smoothed;
 }
 
 /* W = 1 / m. */

@@ -46,6 +46,7 @@ static void lay(crm_reverse *r, crm_block *b, size_t m)
     r->turn.e = crm_carve(b, 6 * rows, sizeof(double));
     r->moved = crm_carve(b, m, sizeof *r->moved);
     r->gap_bar = crm_carve(b, m, sizeof(double));
+    crm_lay_smoothed(r->tape, &r->smoothed, b, k3, m, rows);
 }
 
 static carom_status allocate(crm_reverse *r)
@@ -254,7 +255,7 @@ static carom_status reverse_frame(crm_reverse *r, int frame)
     r->clock_old = swap;
     r->stats.degenerate += r->kinks.n;
     if (r->kinks.n) r->stats.first_degenerate_step = frame + 1;
-    return r->kinks_met;
+    return r->failure;
 }
 
 static void start(crm_reverse *r)

@@ -50,6 +50,7 @@ struct carom_tape {
     /* Checkpoints: only the frames held_from .. held_to - 1 have records; others are run again. */
     int held_from, held_to; /* -1: none */
     double *block_end;      /* 6 n_bodies: state after the held ones, where states are not kept */
+    double kappa;           /* of smoothing [J]; 0: none */
     int every;              /* distance of snapshots; 0: none, all frames are held */
     size_t limit;      /* of the memory of the tape; 0: none, and states of all steps are kept */
     size_t step_bytes; /* most that a step run again has taken */
@@ -140,6 +141,22 @@ double crm_largest(const carom_world *w, const double *x);
 void crm_turn_end(const carom_world *w, const crm_substep *s, const double *p, crm_turn *turn);
 void crm_turn_start(const carom_world *w, const crm_substep *s, crm_turn *turn);
 
+/* Room for a point of the central path near a recorded solution; none when the tape does not
+ * smooth.
+ */
+typedef struct crm_smoothed {
+    double *v, *ln, *lt, *le;
+    unsigned char *mode;
+} crm_smoothed;
+/* shared.c */
+void crm_lay_smoothed(const carom_tape *t, crm_smoothed *to, crm_block *b, size_t k3, size_t m,
+                      size_t rows);
+/* Where the tape smooths, *x becomes the point of the path of problem p near it, kept in `room`; a
+ * problem whose path has no such point, and a correction of positions, stay as they are. */
+carom_status crm_smooth_solution(const carom_tape *t, const carom_contact_problem *p,
+                                 crm_solve_kind kind, const crm_smoothed *room,
+                                 carom_contact_solution *x, carom_gradient_stats *stats);
+
 /* One direction on its way: changes of the state and of what else moves. */
 typedef struct crm_line {
     const carom_gradient *by;  /* parameters, read only */
@@ -176,12 +193,13 @@ typedef struct crm_forward {
     double *rest, *trial;    /* 3 n_bodies: what the passes of stage 1 give; 0 of static bodies */
     carom_contact_problem problem;   /* of the solve under way */
     carom_contact_solution solution; /* likewise */
+    crm_smoothed smoothed;
     crm_contact *moved;
     crm_unpacked work, inner;
     void *block;
     size_t bytes;
     crm_kinks kinks;
-    carom_status kinks_met; /* of noting them */
+    carom_status failure; /* of noting kinks, or of smoothing */
     carom_gradient_stats stats;
 } crm_forward;
 
@@ -201,6 +219,7 @@ typedef struct crm_reverse {
     size_t n_sides;                  /* numbers of u, cn, ct and ce, one behind the other */
     carom_contact_problem problem;   /* of the solve under way */
     carom_contact_solution solution; /* likewise */
+    crm_smoothed smoothed;
     crm_turn turn;
     int wants_shapes, wants_joints; /* 1: radii or vertices; anchors, axes, angles or lengths */
     double *solve_bar;         /* 3 n_bodies: cotangent of the velocity of the solve under way */
@@ -213,7 +232,7 @@ typedef struct crm_reverse {
     int frame;                 /* under way */
     int asked;                 /* 1: for a state after it */
     crm_kinks kinks;
-    carom_status kinks_met;      /* of noting them */
+    carom_status failure;        /* of noting kinks, or of smoothing */
     int record;                  /* under way */
     crm_unpacked work, inner;    /* the sub-step under way, and one within it */
     double *column_q, *column_v; /* 3 n_bodies: cotangents within a column of an extrapolated map */

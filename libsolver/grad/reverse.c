@@ -12,7 +12,10 @@ void crm_pose_solve(crm_reverse *r, crm_substep *s, const crm_solve *c)
     r->solution = x;
     const carom_status e =
         crm_kinks_of_solve(w, &r->tape->memory, &r->kinks, r->frame + 1, s, c, &r->problem);
-    if (e < 0) r->kinks_met = e;
+    const carom_status smoothed =
+        crm_smooth_solution(r->tape, &r->problem, c->kind, &r->smoothed, &r->solution, &r->stats);
+    if (e < 0) r->failure = e;
+    if (smoothed < 0) r->failure = smoothed;
 }
 
 carom_status crm_sides_vjp(crm_reverse *r, const double *v_bar, double tol)

@@ -63,6 +63,42 @@ void crm_unpack(carom_world *w, const crm_record *record, crm_contact *moved, cr
     }
 }
 
+void crm_lay_smoothed(const carom_tape *t, crm_smoothed *to, crm_block *b, size_t k3, size_t m,
+                      size_t rows)
+{
+    if (!(t->kappa > 0)) return;
+    to->v = crm_carve(b, k3, sizeof(double));
+    to->ln = crm_carve(b, m, sizeof(double));
+    to->lt = crm_carve(b, m, sizeof(double));
+    to->le = crm_carve(b, rows, sizeof(double));
+    to->mode = crm_carve(b, m, 1);
+}
+
+static void copy_numbers(double *to, const double *from, int n)
+{
+    if (n > 0) memcpy(to, from, (size_t)n * sizeof *to);
+}
+
+carom_status crm_smooth_solution(const carom_tape *t, const carom_contact_problem *p,
+                                 crm_solve_kind kind, const crm_smoothed *room,
+                                 carom_contact_solution *x, carom_gradient_stats *stats)
+{
+    if (!(t->kappa > 0) || !p->n_contacts || kind == CRM_CORRECTION) return CAROM_OK;
+    carom_contact_solution y = {room->v, room->ln, room->lt, room->le, room->mode};
+    copy_numbers(y.v, x->v, 3 * p->n_bodies);
+    copy_numbers(y.ln, x->ln, p->n_contacts);
+    copy_numbers(y.lt, x->lt, p->n_contacts);
+    copy_numbers(y.le, x->le, p->n_joint_rows);
+    memcpy(y.mode, x->mode, (size_t)p->n_contacts);
+    const carom_status e = carom_contact_smooth(t->world->solver, p, t->kappa, &y);
+    if (e == CAROM_E_NO_SOLUTION) {
+        stats->unsmoothed++;
+        return CAROM_OK;
+    }
+    if (e >= 0) *x = y;
+    return e;
+}
+
 double crm_first_friction(const carom_world *w, const crm_solve *c, int k, const crm_contact *x)
 {
     const double u = crm_row_dot(&w->rows.jt[6 * k], c->v, x->body_a, x->body_b);

@@ -36,6 +36,7 @@ static void lay(crm_forward *f, crm_block *b, size_t m)
     f->dot.ce = crm_carve(b, rows, sizeof(double));
     f->error = crm_carve(b, rows, sizeof(double));
     f->moved = crm_carve(b, m, sizeof *f->moved);
+    crm_lay_smoothed(f->tape, &f->smoothed, b, k3, m, rows);
     crm_lay_unpacked(&f->work, b, n3);
     if (w->settings.order > 2) crm_lay_unpacked(&f->inner, b, n3);
     f->lines = crm_carve(b, (size_t)f->n + 1, sizeof *f->lines);
@@ -206,7 +207,7 @@ carom_status crm_forward_frame(crm_forward *f, int frame)
     if (f->kinks.n && f->stats.first_degenerate_step < 0) {
         f->stats.first_degenerate_step = frame + 1;
     }
-    return f->kinks_met;
+    return f->failure;
 }
 
 void crm_give_state(const crm_forward *f, const crm_line *line, const carom_state_dot *to)

@@ -294,6 +294,13 @@ carom_status carom_tape_step(carom_tape *tape, const double *force, carom_step_s
     return e;
 }
 
+carom_status carom_tape_smooth(carom_tape *tape, double kappa)
+{
+    if (!tape || !(kappa >= 0 && kappa < HUGE_VAL)) return CAROM_E_ARGUMENT;
+    tape->kappa = kappa;
+    return CAROM_OK;
+}
+
 int carom_tape_steps(const carom_tape *tape)
 {
     return tape ? tape->n_frames : 0;

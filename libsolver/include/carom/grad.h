@@ -39,6 +39,13 @@ CAROM_API size_t carom_tape_bytes(const carom_tape *tape);
 CAROM_API const double *carom_tape_q(const carom_tape *tape, int step);
 CAROM_API const double *carom_tape_v(const carom_tape *tape, int step);
 
+/* Smoothing: gradients, tangents and Jacobians of this tape differentiate, in place of each contact
+ * problem of the recorded run, its point of the central path at kappa [J] (carom_contact_smooth):
+ * at a kink a value between the one-sided derivatives, elsewhere an error of the order of kappa
+ * over the energies that contacts exchange in a sub-step.  The run, the times of events and
+ * corrections of positions stay as they are.  0, as at the start: the derivative itself. */
+CAROM_API carom_status carom_tape_smooth(carom_tape *tape, double kappa);
+
 /* Cotangent of the state after `step` steps: dl/dq, dl/dv (3 n_bodies each; NULL: zero). */
 typedef struct carom_state_bar {
     int step;
@@ -105,6 +112,7 @@ typedef struct carom_gradient_stats {
                                 * borders where a state was asked for */
     int first_degenerate_step; /* -1: none */
     long solves;               /* contact problems differentiated, per direction */
+    long unsmoothed;           /* ... as they are, where kappa is too small or large for them */
     long replayed;             /* steps run again, from checkpoints */
 } carom_gradient_stats;
 
