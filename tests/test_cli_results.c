@@ -138,6 +138,31 @@ static void wrong_losses(void **state)
     program_refuses("gradient %/scenes/a_slide.json --loss loss.json --wrt ''", "--wrt: \"\"");
 }
 
+/* A disc slides to a stop after v^2 / (2 mu g): smoothed, d/dv is off by a little. */
+static void gradient_is_smoothed(void **state)
+{
+    (void)state;
+    double by_speed[2];
+    program_write("loss.json", "{\"terms\":[{\"step\":\"final\",\"body\":1,\"component\":\"x\"}]}");
+    for (int k = 0; k < 2; k++) {
+        program_call c =
+            program_run(k ? "gradient %/scenes/a_slide.json --loss loss.json --smoothing 1e-6"
+                          : "gradient %/scenes/a_slide.json --loss loss.json");
+        assert_int_equal(c.code, 0);
+        json_t *all = program_line(c.out, 0);
+        const json_t *v0 = json_object_get(json_object_get(all, "gradient"), "v0");
+        by_speed[k] = json_number_value(json_array_get(v0, 4));
+        assert_true(!k == !json_object_get(all, "unsmoothed"));
+        if (k) assert_true(program_number(all, "unsmoothed") == 0);
+        json_decref(all);
+        program_free(&c);
+    }
+    assert_true(by_speed[0] != by_speed[1]);
+    assert_near(by_speed[1], by_speed[0], 1e-3);
+    program_refuses("gradient %/scenes/a_slide.json --loss loss.json --smoothing -1",
+                    "--smoothing: \"-1\"");
+}
+
 /* --- contact, lcp */
 
 /* Circle at (0, 0) and box at (3, 0): distance, normal and points known without computing. */
@@ -258,10 +283,15 @@ static void lcp_of_the_data(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(gradient_has_its_arrays),  cmocka_unit_test(gradient_of_a_free_body),
-        cmocka_unit_test(mass_carries_its_inertia), cmocka_unit_test(wrong_losses),
-        cmocka_unit_test(contact_of_given_pairs),   cmocka_unit_test(contact_of_the_vectors),
-        cmocka_unit_test(lcp_solves_by_hand),       cmocka_unit_test(lcp_of_the_data),
+        cmocka_unit_test(gradient_has_its_arrays),
+        cmocka_unit_test(gradient_of_a_free_body),
+        cmocka_unit_test(gradient_is_smoothed),
+        cmocka_unit_test(mass_carries_its_inertia),
+        cmocka_unit_test(wrong_losses),
+        cmocka_unit_test(contact_of_given_pairs),
+        cmocka_unit_test(contact_of_the_vectors),
+        cmocka_unit_test(lcp_solves_by_hand),
+        cmocka_unit_test(lcp_of_the_data),
     };
     return cmocka_run_group_tests(tests, program_make_folder, program_remove_folder);
 }

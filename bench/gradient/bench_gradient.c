@@ -1,7 +1,8 @@
 /* What gradients cost, and how right they are.
  *
- * Usage: bench_gradient [--quick]          both parts as CSV: cost, of steps and gradients of
- *                                          scenes; closed, derivatives with closed forms
+ * Usage: bench_gradient [--quick]          all parts as CSV: cost, of steps and gradients of
+ *                                          scenes; closed, derivatives with closed forms;
+ *                                          differences of whole runs, and smoothed, of the same
  *        bench_gradient closed DT          the second part at a step of DT alone
  *        bench_gradient count SCENE WHAT   WHAT once, in `measured`: for count.sh under callgrind
  *
@@ -200,6 +201,8 @@ typedef struct trial {
     const problem *p;
     double dt;
     int n;
+    double kappa; /* of smoothing; 0: none */
+    double by;    /* of differences */
     double value;
 } trial;
 
@@ -220,6 +223,7 @@ static void with_gradient(void *user)
     double q_bar[6] = {0}, q0[6], v0[6], friction[2], restitution[2];
     must(p->name, carom_tape_create(w, NULL, &tape));
     for (int k = 0; k < x->n; k++) must(p->name, carom_tape_step(tape, NULL, NULL));
+    must(p->name, carom_tape_smooth(tape, x->kappa));
     q_bar[3 + p->coordinate] = 1;
     const carom_state_bar bar = {x->n, q_bar, NULL};
     carom_gradient g = {0};
@@ -237,11 +241,70 @@ static void with_gradient(void *user)
     carom_world_destroy(w);
 }
 
+/* The loss where the parameter is moved by `by`. */
+static double moved(const trial *x, double by)
+{
+    const problem *p = x->p;
+    carom_world *w = p->build(x->dt);
+    double q[6], v[6], friction[2], restitution[2];
+    for (int k = 0; k < 2; k++) friction[k] = restitution[k] = p->coefficient + by;
+    carom_parameters set = {0};
+    if (p->by_friction) set.friction = friction;
+    if (p->by_restitution) set.restitution = restitution;
+    memcpy(q, carom_world_q(w), sizeof q);
+    memcpy(v, carom_world_v(w), sizeof v);
+    if (p->by_q0 >= 0) q[3 + p->by_q0] += by;
+    if (p->by_v0 >= 0) v[3 + p->by_v0] += by;
+    must(p->name, carom_world_set_state(w, q, v));
+    must(p->name, carom_world_set_parameters(w, &set));
+    for (int k = 0; k < x->n; k++) must(p->name, carom_world_step(w, NULL, NULL));
+    const double loss = carom_world_q(w)[3 + p->coordinate];
+    carom_world_destroy(w);
+    return loss;
+}
+
+static void by_differences(void *user)
+{
+    trial *x = user;
+    x->value = (moved(x, x->by) - moved(x, -x->by)) / (2 * x->by);
+}
+
+static trial trial_of(const problem *p, double dt)
+{
+    const trial x = {p, dt, (int)(p->seconds / dt + 0.5), 0, 0, 0};
+    return x;
+}
+
+/* In the columns of the closed forms, with the name of the setting in that of the engine. */
+static void print_trial(const char *part, const trial *x, const char *setting, double size,
+                        double seconds, double forward)
+{
+    const double error = fabs(x->value / x->p->exact - 1);
+    printf("%s,%s,%s %.0e,%s,%.4g,%.12g,%.12g,%.1e,%.3e,%.3g,\n", part, x->p->name, setting, size,
+           x->p->parameter, x->dt, x->value, x->p->exact, error, seconds, seconds / forward);
+}
+
+static void differences_and_smoothing(double dt)
+{
+    for (int k = 0; k < N_PROBLEMS; k++) {
+        trial x = trial_of(&problems[k], dt);
+        const double forward = least_time(steps_alone, &x);
+        for (x.by = 1e-2; x.by > 1e-11; x.by *= 1e-2) {
+            const double seconds = least_time(by_differences, &x);
+            print_trial("differences", &x, "differences of", x.by, seconds, forward);
+        }
+        for (x.kappa = 1e-2; x.kappa > 1e-13; x.kappa *= 1e-2) {
+            const double seconds = least_time(with_gradient, &x);
+            print_trial("smoothed", &x, "smoothed by", x.kappa, seconds, forward);
+        }
+    }
+}
+
 static int closed_forms(double dt)
 {
     int failed = 0;
     for (int k = 0; k < N_PROBLEMS; k++) {
-        trial x = {&problems[k], dt, (int)(problems[k].seconds / dt + 0.5), 0};
+        trial x = trial_of(&problems[k], dt);
         const double forward = least_time(steps_alone, &x);
         const double both = least_time(with_gradient, &x);
         const double error = fabs(x.value / x.p->exact - 1);
@@ -267,5 +330,6 @@ int main(int argc, char **argv)
     printf("part,scene,engine,what,dt,value,exact,error,seconds,over_forward,bytes\n");
     if (argc > 2 && strcmp(argv[1], "closed") == 0) return closed_forms(atof(argv[2]));
     costs(quick);
+    differences_and_smoothing(1.0 / 60);
     return closed_forms(1.0 / 60) | closed_forms(1e-3);
 }

@@ -89,11 +89,11 @@ static carom_world *bounce(double dt)
 }
 
 const problem problems[N_PROBLEMS] = {
-    {"sliding stop", "v0", stop, 1, X, -1, X, 0, 0, 3 / (0.5 * 9.81)},
-    {"sliding stop", "mu", stop, 1, X, -1, -1, 1, 0, -9 / (2 * 0.25 * 9.81)},
-    {"drop and slide", "h", drop, 1.5, X, Y, -1, 0, 0, 0.5},
-    {"oblique impact", "h", oblique, 1, X, Y, -1, 0, 0, 1.0 / 3 / 2},
-    {"oblique impact", "v0", oblique, 1, X, -1, X, 0, 0, 1 - 0.7 / 3},
-    {"wall bounce", "h", bounce, 1, Y, Y, -1, 0, 0, -0.7},
-    {"wall bounce", "e", bounce, 1, Y, -1, -1, 0, 1, 2 - 0.6},
+    {"sliding stop", "v0", stop, 1, X, -1, X, 0, 0, 0, 3 / (0.5 * 9.81)},
+    {"sliding stop", "mu", stop, 1, X, -1, -1, 1, 0, 0.5, -9 / (2 * 0.25 * 9.81)},
+    {"drop and slide", "h", drop, 1.5, X, Y, -1, 0, 0, 0, 0.5},
+    {"oblique impact", "h", oblique, 1, X, Y, -1, 0, 0, 0, 1.0 / 3 / 2},
+    {"oblique impact", "v0", oblique, 1, X, -1, X, 0, 0, 0, 1 - 0.7 / 3},
+    {"wall bounce", "h", bounce, 1, Y, Y, -1, 0, 0, 0, -0.7},
+    {"wall bounce", "e", bounce, 1, Y, -1, -1, 0, 1, 0.7, 2 - 0.6},
 };

@@ -15,6 +15,7 @@ typedef struct problem {
     int by_v0;                        /* likewise */
     int by_friction;                  /* 1: of both bodies together */
     int by_restitution;               /* 1: likewise */
+    double coefficient;               /* that of both bodies, where the derivative is by it */
     double exact;
 } problem;
 

@@ -9,6 +9,7 @@
 #include <string.h>
 
 enum { CHECK_DEFAULT = 20, CHECK_MAX = 1000000 };
+static const double SMOOTHING_MAX = 1e300; /* [J] */
 
 /* --wrt a,b,...: all when it is not given. */
 static int choose_wanted(const crm_arguments *a, crm_gradient *g)
@@ -209,6 +210,7 @@ static int write_gradient(const crm_arguments *a, const crm_run *run, const crm_
     put_arrays(&out, run->scene, g);
     crm_put_field(&out, 0, "degenerate", g->degenerate);
     if (g->name_kinks) put_kinks(&out, g);
+    if (g->smoothing > 0) crm_put_field(&out, 0, "unsmoothed", (double)g->unsmoothed);
     crm_put_field(&out, 0, "seconds_forward", g->seconds_forward);
     crm_put_field(&out, 0, "seconds_backward", g->seconds_backward);
     if (check) put_check(&out, g, check);
@@ -241,6 +243,7 @@ static int differentiate(const crm_arguments *a, const crm_run *run)
     crm_gradient_prepare(&g, run->scene);
     g.name_kinks = crm_argument_given(a, "--kinks");
     int code = choose_wanted(a, &g);
+    if (!crm_argument_number(a, "--smoothing", 0, SMOOTHING_MAX, &g.smoothing)) code = CRM_USAGE;
     if (code == CRM_DONE && !crm_loss_read(&problems, run->scene, run->n_steps, &loss)) {
         code = CRM_USAGE;
         crm_loss_free(&loss);
@@ -271,17 +274,21 @@ static const crm_option options[] = {CRM_LOAD_OPTIONS,
                                      {"--wrt", CRM_TAKES_VALUE},
                                      {"--check", CRM_TAKES_OPTIONAL},
                                      {"--kinks", 0},
+                                     {"--smoothing", CRM_TAKES_VALUE},
                                      {"--out", CRM_TAKES_VALUE},
                                      {NULL, 0}};
 
 const crm_command crm_command_gradient = {
     "gradient",
-    "gradient SCENE --loss LOSS [--wrt mass,friction,...] [--check[=N]] [--kinks] [--out FILE]",
+    "gradient SCENE --loss LOSS [--wrt mass,friction,...] [--check[=N]] [--kinks] [--smoothing K] "
+    "[--out "
+    "FILE]",
     "a loss of the run and its exact gradient, as one JSON object",
     "  --loss LOSS        file with the terms, \"-\" for standard input\n"
     "  --wrt NAMES        of q0, v0, mass, inertia, friction, restitution, gravity, radius,\n"
     "                     vertices, anchors, force, dt; all when not given\n"
     "  --kinks            where derivatives are one-sided: step, bodies and kind\n"
+    "  --smoothing K      derivatives at the central path's kappa = K [J] in place of kinks\n"
     "  --check[=N]        N entries of each array (20) beside central differences\n" CRM_LOAD_HELP
     "  --out FILE         where the result goes, standard output otherwise\n",
     options,

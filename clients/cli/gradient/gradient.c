@@ -99,9 +99,11 @@ static int run_backward(crm_gradient *g, const crm_run *run, const crm_loss *los
     carom_gradient_stats stats;
     memset(&stats, 0, sizeof stats);
     const double start = crm_clock();
+    carom_tape_smooth(tape, g->smoothing);
     const carom_status s = carom_tape_gradient(tape, bars.count, bars.bars, &out, &stats);
     g->seconds_backward = crm_clock() - start;
     g->degenerate = stats.degenerate;
+    g->unsmoothed = stats.unsmoothed;
     crm_loss_bars_free(&bars);
     if (s < 0) {
         fprintf(stderr, "%s: the reverse pass failed: %s: %s\n", run->file, carom_status_name(s),

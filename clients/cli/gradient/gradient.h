@@ -28,6 +28,8 @@ extern const char *const crm_wrt_names[CRM_N_WRT + 1];
 typedef struct crm_gradient {
     double loss;
     int degenerate;
+    double smoothing; /* kappa of carom_tape_smooth; 0: none */
+    long unsmoothed;
     int name_kinks; /* 1: fill kinks */
     int n_kinks;
     carom_kink *kinks;
