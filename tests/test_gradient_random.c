@@ -30,8 +30,6 @@ static const double DOUBT = 10;
 static const double FLOOR = 1e-7;
 /* Differences worse than this say nothing [largest entry of the array]. */
 static const double VAGUE = 1e-3;
-/* A contact that an impact elsewhere does not reach has an impulse of rounding [largest]. */
-static const double NO_IMPULSE = 1e-11;
 /* Two steps confirm each other within this part of their distance from the gradient. */
 static const double FIRM = 0.1;
 /* Entries below this part of the largest of their array are measured against that. */
@@ -57,7 +55,7 @@ typedef struct scene {
     double *weight; /* 4 n: q, v at the middle; q, v at the end */
     gradient_room x;
     int degenerate; /* contacts at kinks, as the gradient counts them */
-    uint64_t active;
+    unsigned long long active;
 } scene;
 
 typedef enum verdict { RIGHT, WRONG, COUNTED, AT_A_KINK, VAGUE_THERE, N_VERDICTS } verdict;
@@ -83,49 +81,6 @@ static double size_of(int array, double x)
     case BY_MOTOR_LIMIT: return fabs(x);
     default: return 1;
     }
-}
-
-static void mix(uint64_t *hash, uint64_t x)
-{
-    *hash = (*hash ^ x) * UINT64_C(0x100000001B3);
-    *hash ^= *hash >> 29;
-}
-
-static void mix_contact(uint64_t *hash, const crm_contact *c)
-{
-    mix(hash, (uint64_t)(c->shape_a + 1) << 32 | (uint64_t)(c->shape_b + 1));
-    mix(hash, (uint64_t)(c->recipe.ref + 1) << 32 | (uint64_t)(c->recipe.inc + 1));
-    mix(hash, (uint64_t)c->recipe.kernel << 16 | (uint64_t)c->recipe.flipped << 8 |
-                  (uint64_t)c->recipe.at_end);
-    mix(hash, (uint64_t)c->limit);
-}
-
-static void mix_substep(uint64_t *hash, const crm_record *r)
-{
-    const crm_substep *s = &r->s;
-    mix(hash, (uint64_t)s->map << 32 | (uint64_t)s->end);
-    mix(hash, (uint64_t)s->n_solves << 32 | (uint64_t)s->finest << 1 | (uint64_t)s->slick);
-    for (int k = 0; k < r->island.n_bodies; k++) mix(hash, (uint64_t)r->island.bodies[k]);
-    for (int i = 0; i < s->n_solves; i++) {
-        const crm_solve *c = &s->solve[i];
-        mix(hash, (uint64_t)c->kind);
-        double most = 0;
-        for (int k = 0; k < s->n_contacts; k++) most = fmax(most, fabs(c->ln[k]));
-        for (int k = 0; k < s->n_contacts; k++) {
-            if (c->mode[k] == CAROM_SEPARATED || fabs(c->ln[k]) <= NO_IMPULSE * most) continue;
-            mix_contact(hash, &s->contacts[k]);
-            mix(hash, c->mode[k]);
-        }
-        for (int k = 0; k < r->island.n_rows; k++) mix(hash, c->motor[k]);
-    }
-    if (s->end == CRM_END_EVENT || s->end == CRM_END_STOP) mix_contact(hash, &s->event);
-}
-
-static uint64_t active_set(const carom_tape *t)
-{
-    uint64_t hash = UINT64_C(0xCBF29CE484222325);
-    for (int k = 0; k < t->n_records; k++) mix_substep(&hash, &t->records[k]);
-    return hash;
 }
 
 /* The run with number `entry` of `array` moved by t, recorded; NULL when a step failed. */
@@ -159,7 +114,7 @@ static double loss(const scene *s, int array, int entry, double t)
     carom_world *w;
     carom_tape *tape = record(s, array, entry, t, &w);
     double sum = NAN;
-    if (tape && active_set(tape) == s->active) {
+    if (tape && crm_branch_of(tape) == s->active) {
         const int half = n_steps / 2;
         sum = dot(s->n, s->weight, carom_tape_q(tape, half)) +
               dot(s->n, s->weight + s->n, carom_tape_v(tape, half)) +
@@ -278,7 +233,7 @@ static void run_scene(uint64_t seed, const carom_world_settings *set, tally *t)
     s.weight = calloc(4 * (size_t)s.n, sizeof(double));
     assert_non_null(s.weight);
     for (int k = 0; k < 4 * s.n; k++) s.weight[k] = rng_uniform(&r, -1, 1);
-    s.active = active_set(tape);
+    s.active = crm_branch_of(tape);
     s.x = gradient_room_make(w, 1);
     const carom_state_bar bars[2] = {{n_steps, s.weight + 2 * s.n, s.weight + 3 * s.n},
                                      {n_steps / 2, s.weight, s.weight + s.n}};

@@ -46,6 +46,7 @@ void crm_geometry_vjp(crm_reverse *r, const double *q, const crm_contact *c,
         crm_limit_vjp(r, q, c->limit, bar, q_bar);
         return;
     }
+    r->stats.contacts++;
     const crm_shape *a = &w->shapes[c->shape_a];
     const crm_shape *b = &w->shapes[c->shape_b];
     carom_vec2 *vertices = r->sink.g.vertices;

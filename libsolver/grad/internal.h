@@ -267,6 +267,9 @@ double crm_border_acceleration(const carom_tape *t, int step, int k);
 /* CAROM_E_STATE, with a word, when parameters have changed since the recording. */
 carom_status crm_tape_current(const carom_tape *t);
 
+/* check.c: all that decides which smooth map a recorded run is, as a number. */
+unsigned long long crm_branch_of(const carom_tape *t);
+
 /* gradient.c: the reverse pass from the state after step `to` to that after step `from`; their
  * forces are force_steps. */
 carom_status crm_gradient_span(carom_tape *t, int from, int to, int n_bars,

@@ -129,6 +129,7 @@ void crm_joint_vjp(crm_reverse *r, const double *q, int joint, const double *je_
 {
     const crm_joint *j = &r->world->joints[joint];
     const crm_measure *measures;
+    r->stats.joints++;
     const int n = crm_joint_measures(j->kind, &measures);
     crm_joint_bar bar = {{{0, 0}, {0, 0}}, 0, 0, 0};
     for (int k = 0; k < n; k++) {

@@ -112,6 +112,8 @@ typedef struct carom_gradient_stats {
                                 * borders where a state was asked for */
     int first_degenerate_step; /* -1: none */
     long solves;               /* contact problems differentiated, per direction */
+    long contacts;             /* contacts whose geometry was differentiated, at one pose each */
+    long joints;               /* joints, likewise */
     long unsmoothed;           /* ... as they are, where kappa is too small or large for them */
     long replayed;             /* steps run again, from checkpoints */
 } carom_gradient_stats;
@@ -128,6 +130,42 @@ CAROM_API carom_status carom_tape_gradient(carom_tape *tape, int n_bars,
  * first `capacity` into kinks (may be NULL when 0). */
 CAROM_API carom_status carom_tape_kinks(carom_tape *tape, int capacity, carom_kink *kinks,
                                         int *count);
+
+/* One number of a gradient beside central differences of whole runs. */
+typedef struct carom_checked {
+    int array; /* member of carom_gradient, from 0: carom_gradient_name */
+    int index;
+    double gradient;
+    double step[2];       /* by which the number was moved to both sides */
+    double difference[2]; /* of second order; NaN: a run failed */
+    double disagreement;  /* the smaller of both, over the largest of: gradient, difference, a
+                           * thousandth of the largest of the array, what changes the loss by 1e-4
+                           * of itself for a change of the number's size; HUGE_VAL: no difference */
+    int one_sided;        /* 1: a number at the bound of its range, moved to one side only */
+    int kink; /* 1: with both steps the moved runs differ from the recorded one in contacts, modes
+               * or events: a kink may lie between */
+} carom_checked;
+
+typedef struct carom_check_settings {
+    int per_array;           /* numbers of each array that is given, 20; 0: all */
+    unsigned long long seed; /* of the choice, 1 */
+    double step[2]; /* sizes of the steps, relative to the number or its scale, 1e-5, 1e-6 */
+    int (*progress)(void *user, int done, int all); /* not 0: stop; NULL: none */
+    void *user;
+} carom_check_settings;
+CAROM_API carom_check_settings carom_check_defaults(void);
+/* "q0", "v0", "mass", ...; NULL for any other number. */
+CAROM_API const char *carom_gradient_name(int array);
+/* Checks what carom_tape_gradient made of the same bars: each chosen number of each array of
+ * `gradient` that is not NULL is moved to both sides, by two steps, on copies of the world that run
+ * the tape's steps again (4 runs a number; the tape and its world stay as they are).  settings may
+ * be NULL.  *count: numbers chosen; with entries the numbers checked, in order: fewer where
+ * progress stopped it or capacity is less.  CAROM_E_STATE: parameters have changed since the
+ * recording, or the tape's memory is bounded. */
+CAROM_API carom_status carom_tape_check(carom_tape *tape, int n_bars, const carom_state_bar *bars,
+                                        const carom_gradient *gradient,
+                                        const carom_check_settings *settings, int capacity,
+                                        carom_checked *entries, int *count);
 
 /* Change of the state after `step` steps: 3 n_bodies each, overwritten; NULL: not wanted. */
 typedef struct carom_state_dot {
