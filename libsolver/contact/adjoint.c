@@ -121,7 +121,7 @@ static double find_defect(crm_island *s, const double *g)
         const crm_group *group = &s->group[q];
         const int at = 3 * (s->nb + q);
         for (int r = 0; r < CRM_GROUP_ROWS; r++) {
-            crm_add(z, group->j[r], group->a, group->b, -s->x.z[at + r]);
+            crm_add(z, group->left[r], group->a, group->b, -s->x.z[at + r]);
             z[at + r] = crm_dot(group->j[r], group->a, group->b, s->x.z);
         }
     }
@@ -259,7 +259,7 @@ static void prescribed(const carom_contact_problem *p, adjoint *a, double *cq)
         if (crm_has_friction(p, k)) crm_row_add(cq, p->jt + 6 * k, body, a->ct[k]);
     }
     for (int r = 0; r < p->n_joint_rows; r++) {
-        crm_row_add(cq, p->je + 6 * r, p->joint_body + 2 * r, a->ce[r]);
+        crm_row_add(cq, (p->je_left ? p->je_left : p->je) + 6 * r, p->joint_body + 2 * r, a->ce[r]);
     }
     for (int i = 0; i < 3 * p->n_bodies; i++) {
         if (!(p->inv_mass[i] > 0)) a->p[i] += cq[i];

@@ -60,6 +60,7 @@ static int joints_valid(const carom_contact_problem *p)
         return 0;
     for (int r = 0; r < n; r++) {
         if (!row_finite(p->je + 6 * r, p->joint_body + 2 * r)) return 0;
+        if (p->je_left && !row_finite(p->je_left + 6 * r, p->joint_body + 2 * r)) return 0;
     }
     return 1;
 }

@@ -41,7 +41,7 @@ void crm_island_defect(const crm_island *s, crm_vec x, double *z)
         const int at = 3 * (s->nb + q);
         for (int r = 0; r < g->n; r++) {
             crm_add(z, g->j[r], g->a, g->b, x.z[at + r]);
-            z[at + r] = -(crm_dot(g->j[r], g->a, g->b, x.z) + g->c[r]);
+            z[at + r] = -(crm_dot(g->left[r], g->a, g->b, x.z) + g->c[r]);
         }
         for (int r = g->n; r < CRM_GROUP_ROWS; r++) z[at + r] = 0;
     }
@@ -182,7 +182,7 @@ static void assemble_group(crm_island *s, int q, double delta)
         double *bj = m >= 0 ? f->u + 9 * (size_t)m : f->l + 9 * (size_t)(-1 - m);
         for (int r = 0; r < CRM_GROUP_ROWS; r++) {
             for (int i = 0; i < 3; i++) {
-                jb[3 * r + i] = g->j[r][3 * e + i];
+                jb[3 * r + i] = g->left[r][3 * e + i];
                 bj[3 * i + r] = g->j[r][3 * e + i];
             }
         }
@@ -205,7 +205,7 @@ void crm_island_assemble(crm_island *s, double shift, double delta)
     for (int q = 0; q < s->ng; q++) assemble_group(s, q, delta);
 }
 
-/* n and t of a contact lie one behind the other. */
+/* n and t of a contact lie one behind the other, as do both rows of a group. */
 static int key_holds(const crm_island *s, double shift, double delta)
 {
     const crm_factor_key *key = s->key;

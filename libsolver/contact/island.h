@@ -31,7 +31,8 @@ typedef struct crm_contact {
 
 /* A scaled joint group; missing and prescribed rows are zero. */
 typedef struct crm_group {
-    double j[CRM_GROUP_ROWS][6];
+    double j[CRM_GROUP_ROWS][6];    /* along which impulses act */
+    double left[CRM_GROUP_ROWS][6]; /* that hold; j but for Newton's method on positions */
     double c[CRM_GROUP_ROWS];
     double residual[CRM_GROUP_ROWS];
     int n; /* rows, without missing ones */
@@ -55,7 +56,7 @@ typedef struct crm_response {
 
 /* What the factors of an island were made of.  A matrix that comes again, as when only the
  * right-hand sides of a problem change, is not factored again; the factors are the same bits. */
-enum { CRM_KEY_ROW = 12, CRM_KEY_GROUP = 6 * CRM_GROUP_ROWS };
+enum { CRM_KEY_ROW = 12, CRM_KEY_GROUP = 12 * CRM_GROUP_ROWS };
 typedef struct crm_factor_key {
     int valid;
     double shift;

@@ -139,6 +139,11 @@ static void gather_group(crm_system *y, const crm_graph *g, const carom_contact_
         *scale = row_scale(p, je, body);
         if (!(*scale > 0)) continue;
         scale_row(root, g->group_node + 2 * slot, *scale, je, q->j[i]);
+        if (p->je_left) {
+            scale_row(root, g->group_node + 2 * slot, *scale, p->je_left + 6 * r, q->left[i]);
+        } else {
+            memcpy(q->left[i], q->j[i], sizeof q->left[i]);
+        }
         q->c[i] = *scale * row_start(p, je, body, ce);
         widen(v, crm_row_speed(je, body, p->u, ce), *scale);
     }

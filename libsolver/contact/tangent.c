@@ -100,8 +100,9 @@ static void find_rows(const carom_contact_problem *p, const carom_contact_soluti
         t->rt[k] = row_change(p->jt + 6 * k, d->jt ? d->jt + 6 * k : NULL, entry(d->ct, k), body,
                               x->v, t->e);
     }
+    const double *left = p->je_left ? p->je_left : p->je;
     for (int r = 0; r < p->n_joint_rows; r++)
-        t->re[r] = row_change(p->je + 6 * r, d->je ? d->je + 6 * r : NULL, entry(d->ce, r),
+        t->re[r] = row_change(left + 6 * r, d->je ? d->je + 6 * r : NULL, entry(d->ce, r),
                               p->joint_body + 2 * r, x->v, t->e);
 }
 
@@ -145,7 +146,7 @@ static double row_miss(const crm_island *s)
     for (int q = 0; q < s->ng; q++) {
         const crm_group *g = &s->group[q];
         for (int r = 0; r < CRM_GROUP_ROWS; r++) {
-            miss = fmax(miss, fabs(g->c[r] + crm_dot(g->j[r], g->a, g->b, s->x.z)));
+            miss = fmax(miss, fabs(g->c[r] + crm_dot(g->left[r], g->a, g->b, s->x.z)));
         }
     }
     return miss;

@@ -186,6 +186,7 @@ typedef struct crm_forward {
     int record;      /* under way */
     crm_problem_dot dot;
     crm_turn turn;
+    double *left;            /* 6 per joint row: rows at the end of stage 1 */
     double *gap;             /* per contact: change of its gap at the pose of the rows */
     double *error;           /* per joint row */
     double *result;          /* 3 per body of the island: of the velocity of a solve */

@@ -340,10 +340,25 @@ static carom_status sum_passes(crm_reverse *r, const crm_substep *s, double tol,
     return error <= loose ? CAROM_OK : CAROM_E_NO_SOLUTION;
 }
 
+/* The same of joints alone, at once: at the fixed point the rows at the end of the stage hold, and
+ * impulses act along those at its start. */
+static carom_status close_joints(crm_reverse *r)
+{
+    const size_t n = 6 * (size_t)r->world->island->n_rows;
+    double *left = r->bars.je; /* nothing is there yet */
+    for (size_t i = 0; i < n; i++) left[i] = r->world->rows.je[i] + r->turn.e[i];
+    r->problem.je_left = left;
+    const carom_status e = crm_sides_vjp(r, r->solve_bar, 0);
+    r->problem.je_left = NULL;
+    if (e >= 0) memcpy(r->total.u, r->bars.u, r->n_sides * sizeof(double));
+    return e;
+}
+
 /* Sum of the passes from the cotangent r->solve_bar = l of the velocity: r->total. */
 static carom_status close_vjp(crm_reverse *r, const crm_substep *s)
 {
     const carom_world *w = r->world;
+    if (!s->n_contacts && w->island->n_rows) return close_joints(r);
     const double first = crm_largest(w, r->solve_bar);
     double last = HUGE_VAL;
     memset(r->total.u, 0, r->n_sides * sizeof(double));

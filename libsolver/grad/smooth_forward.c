@@ -151,6 +151,12 @@ static carom_status stage_1_jvp(crm_forward *f, crm_substep *s, int n)
     crm_turn_end(w, s, f->pose, &f->turn);
     crm_begin_solve(f, s, c);
     crm_turn_start(w, s, &f->turn);
+    /* joints alone need no passes: at the fixed point their rows at the end of the stage hold */
+    const int at_once = !s->n_contacts && w->island->n_rows;
+    for (int k = 0; at_once && k < 6 * w->island->n_rows; k++) {
+        f->left[k] = w->rows.je[k] + f->turn.e[k];
+    }
+    f->problem.je_left = at_once ? f->left : NULL;
     for (int i = 0; i < n; i++) {
         crm_line *line = &f->lines[i];
         crm_copy(w, line->v0, line->v);
@@ -158,8 +164,8 @@ static carom_status stage_1_jvp(crm_forward *f, crm_substep *s, int n)
         crm_free_velocity_jvp(f, s, c, line, line->v0);
         crm_drive_jvp(f, s, c, line);
         sides_jvp(f, s, line);
-        carom_status e = crm_solve_jvp(f, f->rest);
-        if (e >= 0) e = close_jvp(f, s, line->v);
+        carom_status e = crm_solve_jvp(f, at_once ? line->v : f->rest);
+        if (e >= 0 && !at_once) e = close_jvp(f, s, line->v);
         if (e < 0) return e;
         crm_move_jvp(w, s, c->v, line->h, line->v, line->q);
     }

@@ -33,6 +33,7 @@ static void lay(crm_forward *f, crm_block *b, size_t m)
     for (int k = 0; k < 4; k++) *contacts[k] = crm_carve(b, m, sizeof(double));
     f->dot.je = crm_carve(b, 6 * rows, sizeof(double));
     f->turn.e = crm_carve(b, 6 * rows, sizeof(double));
+    f->left = crm_carve(b, 6 * rows, sizeof(double));
     f->dot.ce = crm_carve(b, rows, sizeof(double));
     f->error = crm_carve(b, rows, sizeof(double));
     f->moved = crm_carve(b, m, sizeof *f->moved);

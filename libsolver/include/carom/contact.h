@@ -34,6 +34,10 @@ typedef struct carom_contact_problem {
     const int *joint_body; /* 2 n_joint_rows */
     const double *je;      /* 6 n_joint_rows */
     const double *ce;      /* n_joint_rows, NULL: zero */
+    const double *je_left; /* 6 n_joint_rows: rows of J_e v + c_e = 0 where they are not those along
+                            * which impulses act, as in Newton's method on positions; NULL: je.
+                            * For carom_contact_adjoint and _tangent (a direction's je changes those
+                            * that act); carom_contact_solve and residuals want NULL */
 } carom_contact_problem;
 
 typedef enum carom_contact_mode {
