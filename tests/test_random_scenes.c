@@ -30,6 +30,8 @@ static const double STUCK_SHARE = 0.02;
 static const double MOST_FACTORIZATIONS = 2e5;
 /* Bodies are up to a cell of 1 m wide: none is swallowed by another [m]. */
 static const double DEEPEST = 0.5;
+/* A step says what overlaps deeper than 1e-4 L, with L at most the diagonal of a cell [m]. */
+static const double SILENT = 1.5e-4;
 /* Joints are closed, or the step says that they are not: 1e-8 of a cell [m]. */
 static const double LOOSE_JOINT = 1e-8;
 
@@ -205,6 +207,7 @@ static void check_tally(const char *name, const tally *t, const carom_world_sett
     assert_at_most(name, t->residual.value, set->inexact);
     assert_at_most(name, t->overlap.value, DEEPEST);
     assert_at_most(name, t->unsaid.value, LOOSE_JOINT);
+    assert_at_most(name, t->silent.value, SILENT);
 }
 
 static void run_integrator(int integrator)

@@ -5,8 +5,6 @@
 
 /* Time below this fraction of a step is carried into the next one. */
 static const double CARRY_TOL = 1e-13;
-/* Two shapes that together are no thicker are slivers [L]. */
-static const double SLIVER = 1e-2;
 /* Held bodies times sub-steps of one frame; how many in flight are as much work as one that is held;
  * and sub-steps beyond all counting. */
 enum { BODY_SUBSTEPS = 128, FLYING = 16, MAX_SUBSTEPS = 256 };
@@ -199,21 +197,32 @@ static carom_status substep(carom_world *w, double *left, int last)
     return !e && w->events.on ? crm_events_note(w, since) : e;
 }
 
-/* Slivers turn by more than their thickness within a sub-step, and may lie across each other at its
- * end without a contact that was held: all that are near are looked at. */
-static void look_at_slivers(const carom_world *w)
+/* How far a point of a body has moved in the frame, at most [m]. */
+static double way_of(const carom_world *w, int body)
+{
+    const double *to = w->q + 3 * body;
+    const double *from = w->q_saved + 3 * body;
+    return hypot(to[1] - from[1], to[2] - from[2]) +
+           fabs(to[0] - from[0]) * w->bodies[body].reach;
+}
+
+/* Bodies that turn or fly far within a sub-step may lie across each other at its end without a
+ * contact that was held, as may what an event elsewhere has thrown: pairs that moved by more than
+ * that and are near are looked at once more. */
+static void look_at_end(const carom_world *w)
 {
     carom_step_stats *t = w->stats;
     const double rounding = crm_rounding(w);
     for (int k = 0; k < w->island->n_pairs; k++) {
         const carom_pair pair = w->island->pairs[k];
-        const double thickness = w->shapes[pair.a].thickness + w->shapes[pair.b].thickness;
-        if (thickness > SLIVER * w->length || crm_far_apart(w, pair, w->q, 0)) continue;
+        const double deep = crm_deep(w, pair, rounding);
+        const double way = way_of(w, w->shapes[pair.a].body) + way_of(w, w->shapes[pair.b].body);
+        if (way <= deep || crm_far_apart(w, pair, w->q, 0)) continue;
         const double overlap = -crm_collide(w, pair, w->q, HUGE_VAL).distance;
+        if (overlap <= deep) continue;
         t->penetration = fmax(t->penetration, overlap);
-        if (overlap > crm_deep(w, pair, rounding) && t->status < CAROM_LIMIT) {
-            t->status = CAROM_LIMIT;
-        }
+        const double before = -crm_collide(w, pair, w->q_saved, HUGE_VAL).distance;
+        if (overlap > before + deep && t->status < CAROM_LIMIT) t->status = CAROM_LIMIT;
     }
 }
 
@@ -233,7 +242,7 @@ static void finish_island(carom_world *w, double left)
         t->penetration = fmax(t->penetration, -c.gap);
         t->n_contacts++;
     }
-    look_at_slivers(w);
+    look_at_end(w);
     if (w->n_substeps > t->n_substeps) t->n_substeps = w->n_substeps;
 }
 
