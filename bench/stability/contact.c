@@ -346,7 +346,9 @@ const family CONTACT_FAMILIES[] = {
     {"disc into a wedge", "half angle [rad]", "friction", COUNT(HALF_ANGLES), COUNT(FRICTIONS),
      HALF_ANGLES, FRICTIONS, into_wedge, NULL, NULL},
     {"polygons and slivers", "corners", "width / height", COUNT(CORNERS), COUNT(ASPECTS), CORNERS,
-     ASPECTS, polygon, NULL, NULL},
+     ASPECTS, polygon, NULL,
+     "as thin as the way of its corners in a sub-step: some that no gap foresaw overlap at its "
+     "end"},
     {"Painleve rod", "friction", "speed [m/s]", COUNT(FRICTIONS), COUNT(SPEEDS), FRICTIONS, SPEEDS,
      painleve, NULL, NULL},
 };

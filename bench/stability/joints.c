@@ -215,7 +215,7 @@ const family JOINT_FAMILIES[] = {
     {"chain hangs", "links", "end / link mass", COUNT(LINKS), COUNT(RATIOS), LINKS, RATIOS,
      chain_hangs, "nothing moves", "h w = h sqrt(12 g ratio / l) > 512: more parts than max_stiff"},
     {"double pendulum", "mass ratio", "dt [s]", COUNT(RATIOS), COUNT(STEPS), RATIOS, STEPS,
-     double_pendulum, NULL, NULL},
+     double_pendulum, NULL, "h w = h sqrt(12 g ratio / l) > 512: more parts than max_stiff"},
     {"hinges given again", "times", "mass ratio", COUNT(TIMES), COUNT(RATIOS), TIMES, RATIOS,
      redundant, NULL, "as in chain falls, of three links"},
     {"parallel rods", "rods - 1", "mass ratio", COUNT(TIMES), COUNT(RATIOS), TIMES, RATIOS,
