@@ -28,12 +28,13 @@ static void find_misses(const crm_system *y, const crm_graph *g, const carom_con
         if (s->mode[k] != CAROM_STICK || !(s->contact[k].mu > 0)) continue;
         s->rhs.t[k] = -miss(p->jt + 6 * c, body, v, p->ct ? p->ct[c] : 0, y->scale_t[slot] / speed);
     }
+    const double *left = p->je_left ? p->je_left : p->je;
     for (int q = 0; q < s->ng; q++) {
         const int slot = g->group_ptr[island] + q;
         for (int i = 0; i < g->group_size[slot]; i++) {
             const int r = g->group_row[slot] + i;
             s->rhs.z[3 * (s->nb + q) + i] =
-                -miss(p->je + 6 * r, p->joint_body + 2 * r, v, p->ce ? p->ce[r] : 0,
+                -miss(left + 6 * r, p->joint_body + 2 * r, v, p->ce ? p->ce[r] : 0,
                       y->scale_e[3 * slot + i] / speed);
         }
     }

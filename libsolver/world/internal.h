@@ -222,15 +222,17 @@ void crm_rows_free(carom_world *w);
 /* solve.c */
 /* Solves c, whose right-hand sides and pose are set; the result and modes go to c. */
 carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use_guess);
-/* Of joints alone, without motors: the velocity that the guess gives; passes may follow. */
-carom_status crm_solve_guess(carom_world *w, crm_substep *s, crm_solve *c);
-/* Whether what passes led to is a solution: its residual is at most `most`. */
-int crm_solve_holds(carom_world *w, const crm_substep *s, crm_solve *c, double most);
-/* crm_solve_run of joints alone, without motors, by passes from the guess where these suffice. */
+/* Of joints alone, without motors.  c->v: what the guessed impulses give. */
+void crm_guess_velocity(carom_world *w, const crm_substep *s, crm_solve *c);
+/* The solver ready for passes from the guessed impulses, and c->v; left: the rows that shall hold,
+ * NULL: those of the pose. */
+carom_status crm_passes_begin(carom_world *w, crm_substep *s, crm_solve *c, const double *left);
+/* A pass towards c's right-hand sides, with the same left. */
+carom_status crm_pass(carom_world *w, const crm_substep *s, crm_solve *c, const double *left);
+/* Whether c is a solution: its residual is at most `most`. */
+int crm_passes_hold(carom_world *w, const crm_substep *s, crm_solve *c, double most);
+/* crm_solve_run by passes from the guess where these suffice. */
 carom_status crm_solve_joints(carom_world *w, crm_substep *s, crm_solve *c);
-/* A pass towards the equations of c's modes from what has just run, at other cn, ct, ce; not for
- * islands with motors. */
-carom_status crm_solve_pass(carom_world *w, const crm_substep *s, crm_solve *c);
 /* The same for a problem with restitution, unless plastic; where that leaves no solution, without,
  * then without friction, then with as much approach as must be. */
 carom_status crm_solve_bounce(carom_world *w, crm_substep *s, crm_solve *c, int plastic);

@@ -13,11 +13,12 @@ static const double NEWTON_TOL = 1e-14;
 enum { PATIENT = 25, MAX_NEWTON = 40, MAX_VAIN = 10 };
 static const double LOOSE = 1e-9;
 static const double FAR = 1e2;
-static const double HALF = 0.5;
-/* A guess that leaves joints farther open [L], or turns a body by more than without forces [1], may
+/* Newton's method of joints alone goes on while it gains by this [1], and begins from a guess: one
+ * that leaves joints farther open [L], or turns a body by more than without forces [1], may
  * lead to another solution. */
-static const double GUESS_OPEN = 1e-2;
-static const double GUESS_TURN = 0.1;
+static const double HALF = 0.5;
+static const double GUESS_OPEN = 1e-1;
+static const double GUESS_TURN = 0.3;
 /* What passes led to may miss this share of what is accepted: a solve would do better. */
 static const double HOLDS = 0.1;
 /* Speeds beyond this are no error of second order but another solution [what forces can give]. */
@@ -38,6 +39,11 @@ static void set_targets(const carom_world *w, crm_substep *s)
         const double error = w->rows.error[k];
         s->joint_target[k] = error > most ? error - most : error < -most ? error + most : 0;
     }
+}
+
+static double newton_tolerance(const carom_world *w)
+{
+    return NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
 }
 
 /* What makes a contact slip on in its direction: more than any slip speed. */
@@ -176,15 +182,36 @@ static void next_iterate(carom_world *w, const crm_substep *s, crm_solve *c, crm
     take_sides(w, s, asked, a->point, c);
 }
 
-/* Their modes are known: no signs, no friction, no motors. */
+/* The iteration of stage 1, rows and first right-hand sides in place. */
+static carom_status iterate(carom_world *w, crm_substep *s, crm_solve *c)
+{
+    const double tol = newton_tolerance(w);
+    double best = HUGE_VAL;
+    int vain = 0;
+    for (int k = 0; k < MAX_NEWTON && vain <= MAX_VAIN && w->effort < CRM_WORN; k++) {
+        const carom_status e = crm_solve_run(w, s, c, 1);
+        if (e < 0) return e;
+        end_pose(w, s, c);
+        if (!s->n_contacts && !w->island->n_rows) return CAROM_OK;
+        const double moved = next_sides(w, s, c, &s->solve[1]);
+        if (moved <= tol) return CAROM_OK;
+        if (k >= PATIENT && moved <= LOOSE * w->length) return CAROM_INEXACT;
+        if (!(moved < FAR * w->length)) return CAROM_E_NO_SOLUTION;
+        vain = moved < best ? 0 : vain + 1;
+        best = fmin(best, moved);
+        next_iterate(w, s, c, &s->solve[1]);
+    }
+    return CAROM_E_NO_SOLUTION;
+}
+
+/* --- joints alone: their modes are known, no signs, no friction, no motors
+ * ------------------------
+ */
+
 static int has_joints_alone(const carom_world *w, const crm_substep *s)
 {
     return !s->n_contacts && w->island->n_rows && !w->island->n_driven;
 }
-
-/* How an iteration finds the velocity of its right-hand sides: by the guess alone, a pass, a solve.
- */
-typedef enum newton_kind { NEWTON_GUESS, NEWTON_PASS, NEWTON_SOLVE } newton_kind;
 
 /* The right-hand sides whose solution c->v is. */
 static void sides_of_velocity(const carom_world *w, crm_solve *c)
@@ -198,15 +225,7 @@ static void sides_of_velocity(const carom_world *w, crm_solve *c)
     }
 }
 
-static carom_status find_velocity(carom_world *w, crm_substep *s, crm_solve *c, newton_kind kind)
-{
-    if (kind == NEWTON_SOLVE) return crm_solve_run(w, s, c, 1);
-    if (kind == NEWTON_PASS) return crm_solve_pass(w, s, c);
-    const carom_status e = crm_solve_guess(w, s, c);
-    sides_of_velocity(w, c);
-    return e;
-}
-
+/* Whether the pose at the end of the guess is one that Newton's method may begin from. */
 static int guess_is_near(const carom_world *w, const crm_substep *s, const crm_solve *c,
                          double open)
 {
@@ -218,44 +237,50 @@ static int guess_is_near(const carom_world *w, const crm_substep *s, const crm_s
     return open <= GUESS_OPEN * w->length && turn <= GUESS_TURN;
 }
 
-/* The iteration of stage 1, rows and first right-hand sides in place.  Joints alone need no solve
- * that decides on modes: they begin with their guess, passes follow the right-hand sides while they
- * gain by HALF, and the residual ends them. */
-static carom_status iterate(carom_world *w, crm_substep *s, crm_solve *c)
+/* Right-hand sides from the errors at s->q1, with the rows `left`, which with `renew` become those
+ * there; returns the largest error [m]. */
+static double joint_sides(carom_world *w, const crm_substep *s, crm_solve *c, int renew)
 {
-    const double tol = NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
-    const double loose = LOOSE * w->length;
-    const int bound = s->n_contacts || w->island->n_rows;
-    const int joints_alone = has_joints_alone(w, s);
-    newton_kind kind = joints_alone ? NEWTON_GUESS : NEWTON_SOLVE;
-    double best = HUGE_VAL;
-    int vain = 0;
-    for (int k = 0; k < MAX_NEWTON && vain <= MAX_VAIN && w->effort < CRM_WORN; k++) {
-        const carom_status e = find_velocity(w, s, c, kind);
-        if (e < 0) return e;
-        end_pose(w, s, c);
-        if (!bound) return CAROM_OK;
-        const double moved = next_sides(w, s, c, &s->solve[1]);
-        const int lost = !(moved < FAR * w->length);
-        if (lost && kind == NEWTON_SOLVE) return CAROM_E_NO_SOLUTION;
-        if (lost || (kind == NEWTON_GUESS && !guess_is_near(w, s, c, moved))) {
-            first_sides(w, s, c);
-            crm_anderson_forget(&w->anderson);
-            kind = NEWTON_SOLVE;
-            continue;
+    double *left = w->rows.left;
+    double largest = 0;
+    int row = 0;
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        double je[6 * CRM_MAX_JOINT_ROWS];
+        double error[CRM_MAX_JOINT_ROWS];
+        crm_joint_rows(j, s->q1, je, error);
+        if (renew) memcpy(&left[6 * row], je, 6 * (size_t)j->n_rows * sizeof *je);
+        for (int i = 0; i < j->n_rows; i++, row++) {
+            const double miss = error[i] - s->joint_target[row];
+            const double u = crm_row_dot(&left[6 * row], c->v, j->body_a, j->body_b);
+            c->ce[row] = miss / s->h - u;
+            largest = fmax(largest, fabs(miss));
         }
-        const int near = moved <= tol || (k >= PATIENT && moved <= loose);
-        if (near &&
-            (kind == NEWTON_SOLVE || crm_solve_holds(w, s, c, HOLDS * w->settings.accept))) {
-            return moved <= tol ? CAROM_OK : CAROM_INEXACT;
-        }
-        const int gains = k == 0 || moved < HALF * best;
-        kind = joints_alone && gains && !near ? NEWTON_PASS : NEWTON_SOLVE;
-        vain = moved < best ? 0 : vain + 1;
-        best = fmin(best, moved);
-        if (!near) next_iterate(w, s, c, &s->solve[1]);
     }
-    return CAROM_E_NO_SOLUTION;
+    return largest;
+}
+
+/* Newton's method with the rows at the end of the guess, so that it gains some digits by each
+ * back-substitution.  1: done, a solution by its residual; 0: it must be found otherwise. */
+static int close_joints(carom_world *w, crm_substep *s, crm_solve *c)
+{
+    const double tol = newton_tolerance(w);
+    double last = HUGE_VAL;
+    crm_guess_velocity(w, s, c);
+    for (int k = 0; k < MAX_NEWTON; k++) {
+        end_pose(w, s, c);
+        const double open = joint_sides(w, s, c, k == 0);
+        if (k == 0 && !guess_is_near(w, s, c, open)) return 0;
+        if (open <= tol) {
+            sides_of_velocity(w, c);
+            return crm_passes_hold(w, s, c, HOLDS * w->settings.accept);
+        }
+        if (!(open < HALF * last)) return 0;
+        last = open;
+        if (k == 0 && crm_passes_begin(w, s, c, w->rows.left) < 0) return 0;
+        if (crm_pass(w, s, c, w->rows.left) < 0) return 0;
+    }
+    return 0;
 }
 
 /* Stage 1: M vh = M v0 + h/2 f + J0' l with gaps, slips and joints met at q1 = q0 + h vh. */
@@ -268,6 +293,7 @@ static carom_status stage_1(carom_world *w, crm_substep *s)
     crm_rows_at(w, s, s->q0);
     crm_solve_start(w, s, c);
     set_targets(w, s);
+    if (has_joints_alone(w, s) && close_joints(w, s, c)) return CAROM_OK;
     first_sides(w, s, c);
     const carom_status e = crm_anderson_start(&w->memory, &w->anderson, n);
     return e < 0 ? e : iterate(w, s, c);

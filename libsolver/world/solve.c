@@ -125,28 +125,46 @@ carom_status crm_solve_run(carom_world *w, crm_substep *s, crm_solve *c, int use
     return e;
 }
 
-/* J u + c of one row, u in the order of the island. */
-static double row_value(const double row[6], const int body[2], const double *u, double c)
-{
-    for (int side = 0; side < 2; side++) {
-        if (body[side] < 0) continue;
-        for (int i = 0; i < 3; i++) c += row[3 * side + i] * u[3 * body[side] + i];
-    }
-    return c;
-}
-
-carom_status crm_solve_guess(carom_world *w, crm_substep *s, crm_solve *c)
+void crm_guess_velocity(carom_world *w, const crm_substep *s, crm_solve *c)
 {
     const carom_contact_problem p = crm_problem(w, s, c);
-    carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
-    const carom_status e = carom_contact_start(crm_solver(w), &p, &x);
-    if (e < 0) return e;
-    s->degenerate = 0;
-    take_velocities(w, w->rows.v, c->v);
-    return CAROM_OK;
+    double *v = w->rows.v;
+    memset(v, 0, 3 * (size_t)p.n_bodies * sizeof *v);
+    for (int r = 0; r < p.n_joint_rows; r++) {
+        for (int i = 0; i < 6; i++) {
+            const int body = p.joint_body[2 * r + i / 3];
+            if (body >= 0) v[3 * body + i % 3] += p.je[6 * r + i] * c->le[r];
+        }
+    }
+    for (int i = 0; i < 3 * p.n_bodies; i++) v[i] = p.u[i] + p.inv_mass[i] * v[i];
+    take_velocities(w, v, c->v);
 }
 
-int crm_solve_holds(carom_world *w, const crm_substep *s, crm_solve *c, double most)
+carom_status crm_passes_begin(carom_world *w, crm_substep *s, crm_solve *c, const double *left)
+{
+    carom_contact_problem p = crm_problem(w, s, c);
+    carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
+    p.je_left = left;
+    s->degenerate = 0;
+    const carom_status e = carom_contact_start(crm_solver(w), &p, &x);
+    if (e >= 0) take_velocities(w, w->rows.v, c->v);
+    return e;
+}
+
+carom_status crm_pass(carom_world *w, const crm_substep *s, crm_solve *c, const double *left)
+{
+    carom_contact_problem p = crm_problem(w, s, c);
+    carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
+    int n = 0;
+    p.je_left = left;
+    const carom_status e = carom_contact_pass(crm_solver(w), &p, &x, &n);
+    w->effort += n;
+    w->stats->factorizations += n;
+    take_velocities(w, w->rows.v, c->v);
+    return e;
+}
+
+int crm_passes_hold(carom_world *w, const crm_substep *s, crm_solve *c, double most)
 {
     const carom_contact_problem p = crm_problem(w, s, c);
     const carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
@@ -156,29 +174,27 @@ int crm_solve_holds(carom_world *w, const crm_substep *s, crm_solve *c, double m
     return 1;
 }
 
-carom_status crm_solve_pass(carom_world *w, const crm_substep *s, crm_solve *c)
-{
-    const carom_contact_problem p = crm_problem(w, s, c);
-    carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
-    int n = 0;
-    const carom_status e = carom_contact_pass(crm_solver(w), &p, &x, &n);
-    w->effort += n;
-    w->stats->factorizations += n;
-    take_velocities(w, w->rows.v, c->v);
-    return e;
-}
-
 carom_status crm_solve_joints(carom_world *w, crm_substep *s, crm_solve *c)
 {
-    carom_status e = crm_solve_guess(w, s, c);
-    for (int k = 0; e >= 0 && k < MAX_PASSES; k++) e = crm_solve_pass(w, s, c);
-    if (e < 0 || crm_solve_holds(w, s, c, EXACT)) return e;
+    carom_status e = crm_passes_begin(w, s, c, NULL);
+    for (int k = 0; e >= 0 && k < MAX_PASSES; k++) e = crm_pass(w, s, c, NULL);
+    if (e < 0 || crm_passes_hold(w, s, c, EXACT)) return e;
     return crm_solve_run(w, s, c, 1);
 }
 
 static int unsolved(carom_status e)
 {
     return e == CAROM_E_INFEASIBLE || e == CAROM_E_NO_SOLUTION;
+}
+
+/* J u + c of one row, u in the order of the island. */
+static double row_value(const double row[6], const int body[2], const double *u, double c)
+{
+    for (int side = 0; side < 2; side++) {
+        if (body[side] < 0) continue;
+        for (int i = 0; i < 3; i++) c += row[3 * side + i] * u[3 * body[side] + i];
+    }
+    return c;
 }
 
 /* The last solve was infeasible by y: moves its right-hand sides by the least that y allows; 0

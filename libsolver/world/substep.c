@@ -109,6 +109,7 @@ static void lay_fixed_rows(const carom_world *w, int n, crm_block *b, void *obje
     const size_t n3 = 3 * (size_t)w->n_moving;
     r->joint_body = crm_carve(b, 2 * rows, sizeof(int));
     r->je = crm_carve(b, 6 * rows, sizeof(double));
+    r->left = crm_carve(b, 6 * rows, sizeof(double));
     r->error = crm_carve(b, rows, sizeof(double));
     r->ye = crm_carve(b, rows, sizeof(double));
     r->u = crm_carve(b, n3, sizeof(double));

@@ -210,6 +210,7 @@ typedef struct crm_rows {
     double *ye;
     int *joint_body;
     double *je;
+    double *left;     /* 6 per joint row: rows at the end of a guess of stage 1 */
     double *error;    /* per joint row: position error at the pose of the rows [m] */
     double *u;        /* 3 n_moving */
     double *v;        /* 3 n_moving: solution */
