@@ -1,6 +1,6 @@
 """Maps of the stability atlas and its page from the CSV of bench_stability.
 
-usage: plot.py CSV OUTDIR  (writes stability-<family>.svg and .png, and stability.md)"""
+usage: plot.py CSV OUTDIR  (writes stability-<family>.png, and stability.md)"""
 
 import csv
 import os
@@ -13,6 +13,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
+from PIL import Image  # comes with matplotlib
+
+COLORS_OF_A_MAP = 64
 
 COLORS = ("green", "yellow", "red", "black", "none")
 SHADES = ("#6abf69", "#f2cf4a", "#d9534f", "#1a1a1a", "#e8e8e8")
@@ -83,9 +86,11 @@ def draw(family, rows, out):
                   loc="upper right", fontsize=5, ncol=5, frameon=False)
     figure.suptitle(family, fontsize=9, x=0.02, ha="left")
     figure.tight_layout(rect=(0, 0, 1, 0.95))
-    for kind in ("svg", "png"):
-        figure.savefig(os.path.join(out, f"{slug(family)}.{kind}"), dpi=110,
-                       metadata={"Date": None} if kind == "svg" else None)
+    # forty maps: few colors keep them small
+    path = os.path.join(out, f"{slug(family)}.png")
+    figure.savefig(path, dpi=110)
+    with Image.open(path) as image:
+        image.convert("RGB").quantize(COLORS_OF_A_MAP).save(path, optimize=True)
     plt.close(figure)
 
 
@@ -105,7 +110,7 @@ def summary(families, engines, notes):
     for family, rows in families.items():
         known = notes.get(family, ("", ""))[0] or "-"
         cells = [counts(rows, e) for e in engines]
-        yield f"| [{family}]({slug(family)}.svg) | {known} | " + " | ".join(cells) + " |"
+        yield f"| [{family}]({slug(family)}.png) | {known} | " + " | ".join(cells) + " |"
 
 
 def worst(rows, key):
