@@ -303,13 +303,40 @@ static void without_contacts(void **state)
     }
 }
 
+/* A contact whose normal only sees what is prescribed is none, beside one that is smoothed. */
+static void prescribed_motion(void **state)
+{
+    (void)state;
+    const double zero[2] = {0, 0};
+    const double arm[2] = {0.5, 0};
+    const double up[2] = {0, 1};
+    contact_case c = contact_case_new(2, 2, 0);
+    carom_contact_solver *s;
+    double u_bar[6];
+    const double bar[6] = {1, 1, 1, 1, 1, 1};
+    carom_contact_bars bars = {.u = u_bar};
+    contact_case_body(&c, 0, 1, 1, -1, 0, 1);
+    c.inv_mass[1] = c.inv_mass[2] = 0; /* it turns, and goes where it goes */
+    contact_case_body(&c, 1, 1, 1, 0, 0, -1);
+    contact_case_contact(&c, -1, 0, zero, zero, up, 0.5, 0);
+    contact_case_contact(&c, 0, 1, arm, zero, up, 0.5, 0);
+    assert_int_equal(carom_contact_create(NULL, NULL, &s), CAROM_OK);
+    assert_int_equal(carom_contact_solve(s, &c.p, 0, &c.x, NULL), CAROM_OK);
+    assert_int_equal(carom_contact_smooth(s, &c.p, 1e-4, &c.x), CAROM_OK);
+    assert_int_equal(carom_contact_adjoint(s, &c.p, &c.x, bar, &bars), CAROM_OK);
+    for (int i = 0; i < 6; i++) assert_true(isfinite(u_bar[i]));
+    assert_true(u_bar[5] > 0 && u_bar[5] < 1);
+    carom_contact_destroy(s);
+    contact_case_free(&c);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_contact),       cmocka_unit_test(every_array),
         cmocka_unit_test(transposed),        cmocka_unit_test(error_is_linear),
         cmocka_unit_test(between_at_a_kink), cmocka_unit_test(refused),
-        cmocka_unit_test(without_contacts),
+        cmocka_unit_test(without_contacts),  cmocka_unit_test(prescribed_motion),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

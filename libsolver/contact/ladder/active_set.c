@@ -34,6 +34,10 @@ void crm_set_smooth_responses(crm_island *s)
         const double plus = mu * ln + s->x.t[k];
         const double minus = mu * ln - s->x.t[k];
         const double nn = ln * ln / s->kappa;
+        if (!(nn > 0)) { /* prescribed: nobody feels it */
+            s->mode[k] = CAROM_SEPARATED;
+            continue;
+        }
         const double share = crm_friction_share(s->mode[k], mu, ln, s->x.t[k]);
         const double squares = plus * plus + minus * minus;
         s->slack[CRM_SMOOTH_NN][k] = nn;
