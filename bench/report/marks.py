@@ -95,7 +95,7 @@ def failures(rows):
         errors = [error_at(rows, m["scene"], name) for name in peers]
         if own:
             others = " | ".join(f"{e[0]:.1e}" if e else "-" for e in errors)
-            holds = own[1] == 0 and all(not e or own[0] < e[0] for e in errors)
+            holds = own[1] == 0 and all(not e or own[0] <= e[0] for e in errors)
             lines.append(f"| {m['scene']} | {m['who']} | {m['what']} | {others} | {own[0]:.1e} | {'won' if holds else 'lost'} |")
     return lines
 

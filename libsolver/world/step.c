@@ -202,7 +202,7 @@ static double way_of(const carom_world *w, int body)
 {
     const double *to = w->q + 3 * body;
     const double *from = w->q_saved + 3 * body;
-    return hypot(to[1] - from[1], to[2] - from[2]) +
+    return fabs(to[1] - from[1]) + fabs(to[2] - from[2]) +
            fabs(to[0] - from[0]) * w->bodies[body].reach;
 }
 
