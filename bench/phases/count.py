@@ -20,7 +20,7 @@ TOO_LONG = 240  # [s]
 PHASES = {
     "collision": "detect box_tree sweep_few sweep_few_avx2 islands grid broadphase",
     "assembly": "rows joint limit drive damping system entries sparse scale graph block_pattern block_order substep solvers",
-    "solution": "solve contact active_set interior_point damped ladder path crossover sweeps lemke interior polish "
+    "solution": "solve contact pass active_set interior_point damped ladder path crossover sweeps lemke interior polish "
                 "kkt certify check residual island random farkas euler block_lu modes anderson",
     "events": "locate stop change slip further smooth extrapolate stiff step energy",
     "tape": "tape checkpoint",
