@@ -80,7 +80,9 @@ def run_piece(command, path, reader=None, optional=False):
     with open(partial, "w", encoding="utf-8") as out, open(path + ".log", "w", encoding="utf-8") as log:
         if reader:
             scene = subprocess.run(command, stdout=subprocess.PIPE, stderr=log, check=True).stdout
-            code = subprocess.run(reader, input=scene, stdout=out, stderr=log, check=False).returncode
+            # MuJoCo leaves a log where it runs
+            code = subprocess.run(reader, input=scene, stdout=out, stderr=log, check=False,
+                                  cwd=os.path.dirname(path)).returncode
         else:
             code = subprocess.run(command, stdout=out, stderr=log, check=False).returncode
     # the atlas counts black cells in its code: its figures are whole all the same
