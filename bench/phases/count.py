@@ -22,7 +22,7 @@ PHASES = {
     "assembly": "rows joint limit drive damping system entries sparse scale graph block_pattern block_order substep solvers",
     "solution": "solve contact pass active_set interior_point damped ladder path crossover sweeps lemke interior polish "
                 "kkt certify check residual island random farkas euler block_lu modes anderson",
-    "events": "locate stop change slip further smooth extrapolate stiff step energy",
+    "events": "locate stop change slip further smooth joints_alone extrapolate stiff step energy",
     "tape": "tape checkpoint",
 }
 GEOMETRY = "libcarom_geom.a"

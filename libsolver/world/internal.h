@@ -324,6 +324,14 @@ carom_contact_problem crm_hold_problem(carom_world *w, const crm_substep *s, con
 /* The maps: from (q0, v0) of w->sub to (q1, v1). */
 carom_status crm_euler(carom_world *w, double h);  /* euler.c */
 carom_status crm_smooth(carom_world *w, double h); /* smooth.c */
+/* smooth.c: the largest error that stage 1 may leave [m]; q1 <- q0 + h v. */
+double crm_newton_tolerance(const carom_world *w);
+void crm_end_pose(const carom_world *w, crm_substep *s, const crm_solve *c);
+/* joints_alone.c: Newton's method with the rows at the end of the guess, so that it gains some
+ * digits by each back-substitution.  1: done, a solution by its residual; 0: it must be found
+ * otherwise. */
+int crm_has_joints_alone(const carom_world *w, const crm_substep *s);
+int crm_close_joints(carom_world *w, crm_substep *s, crm_solve *c);
 /* smooth.c: whether forces on the island depend on velocities that stage 2 is to find. */
 int crm_sees_speed(const carom_world *w);
 /* smooth.c; plastic: without restitution, CAROM_LIMIT. */

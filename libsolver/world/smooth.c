@@ -13,14 +13,6 @@ static const double NEWTON_TOL = 1e-14;
 enum { PATIENT = 25, MAX_NEWTON = 40, MAX_VAIN = 10 };
 static const double LOOSE = 1e-9;
 static const double FAR = 1e2;
-/* Newton's method of joints alone goes on while it gains by this [1], and begins from a guess: one
- * that leaves joints farther open [L], or turns a body by more than without forces [1], may
- * lead to another solution. */
-static const double HALF = 0.5;
-static const double GUESS_OPEN = 1e-1;
-static const double GUESS_TURN = 0.3;
-/* What passes led to may miss this share of what is accepted: a solve would do better. */
-static const double HOLDS = 0.1;
 /* Speeds beyond this are no error of second order but another solution [what forces can give]. */
 static const double GAIN = 1.5;
 /* From here on it is said: the step is long for what turns in it. */
@@ -41,7 +33,7 @@ static void set_targets(const carom_world *w, crm_substep *s)
     }
 }
 
-static double newton_tolerance(const carom_world *w)
+double crm_newton_tolerance(const carom_world *w)
 {
     return NEWTON_TOL * w->length + 0.25 * crm_rounding(w);
 }
@@ -132,7 +124,7 @@ static double next_sides(const carom_world *w, const crm_substep *s, const crm_s
     return largest;
 }
 
-static void end_pose(const carom_world *w, crm_substep *s, const crm_solve *c)
+void crm_end_pose(const carom_world *w, crm_substep *s, const crm_solve *c)
 {
     crm_copy(w, s->q1, s->q0);
     crm_move(w, s->q1, c->v, s->h);
@@ -185,13 +177,13 @@ static void next_iterate(carom_world *w, const crm_substep *s, crm_solve *c, crm
 /* The iteration of stage 1, rows and first right-hand sides in place. */
 static carom_status iterate(carom_world *w, crm_substep *s, crm_solve *c)
 {
-    const double tol = newton_tolerance(w);
+    const double tol = crm_newton_tolerance(w);
     double best = HUGE_VAL;
     int vain = 0;
     for (int k = 0; k < MAX_NEWTON && vain <= MAX_VAIN && w->effort < CRM_WORN; k++) {
         const carom_status e = crm_solve_run(w, s, c, 1);
         if (e < 0) return e;
-        end_pose(w, s, c);
+        crm_end_pose(w, s, c);
         if (!s->n_contacts && !w->island->n_rows) return CAROM_OK;
         const double moved = next_sides(w, s, c, &s->solve[1]);
         if (moved <= tol) return CAROM_OK;
@@ -204,85 +196,6 @@ static carom_status iterate(carom_world *w, crm_substep *s, crm_solve *c)
     return CAROM_E_NO_SOLUTION;
 }
 
-/* --- joints alone: their modes are known, no signs, no friction, no motors
- * ------------------------
- */
-
-static int has_joints_alone(const carom_world *w, const crm_substep *s)
-{
-    return !s->n_contacts && w->island->n_rows && !w->island->n_driven;
-}
-
-/* The right-hand sides whose solution c->v is. */
-static void sides_of_velocity(const carom_world *w, crm_solve *c)
-{
-    int row = 0;
-    for (int k = 0; k < w->island->n_joints; k++) {
-        const crm_joint *j = &w->joints[w->island->joints[k]];
-        for (int i = 0; i < j->n_rows; i++, row++) {
-            c->ce[row] = -crm_row_dot(&w->rows.je[6 * row], c->v, j->body_a, j->body_b);
-        }
-    }
-}
-
-/* Whether the pose at the end of the guess is one that Newton's method may begin from. */
-static int guess_is_near(const carom_world *w, const crm_substep *s, const crm_solve *c,
-                         double open)
-{
-    double turn = 0;
-    for (int k = 0; k < w->island->n_bodies; k++) {
-        const int b = w->island->bodies[k];
-        turn = fmax(turn, s->h * fabs(c->v[3 * b] - s->v0[3 * b]));
-    }
-    return open <= GUESS_OPEN * w->length && turn <= GUESS_TURN;
-}
-
-/* Right-hand sides from the errors at s->q1, with the rows `left`, which with `renew` become those
- * there; returns the largest error [m]. */
-static double joint_sides(carom_world *w, const crm_substep *s, crm_solve *c, int renew)
-{
-    double *left = w->rows.left;
-    double largest = 0;
-    int row = 0;
-    for (int k = 0; k < w->island->n_joints; k++) {
-        const crm_joint *j = &w->joints[w->island->joints[k]];
-        double je[6 * CRM_MAX_JOINT_ROWS];
-        double error[CRM_MAX_JOINT_ROWS];
-        crm_joint_rows(j, s->q1, je, error);
-        if (renew) memcpy(&left[6 * row], je, 6 * (size_t)j->n_rows * sizeof *je);
-        for (int i = 0; i < j->n_rows; i++, row++) {
-            const double miss = error[i] - s->joint_target[row];
-            const double u = crm_row_dot(&left[6 * row], c->v, j->body_a, j->body_b);
-            c->ce[row] = miss / s->h - u;
-            largest = fmax(largest, fabs(miss));
-        }
-    }
-    return largest;
-}
-
-/* Newton's method with the rows at the end of the guess, so that it gains some digits by each
- * back-substitution.  1: done, a solution by its residual; 0: it must be found otherwise. */
-static int close_joints(carom_world *w, crm_substep *s, crm_solve *c)
-{
-    const double tol = newton_tolerance(w);
-    double last = HUGE_VAL;
-    crm_guess_velocity(w, s, c);
-    for (int k = 0; k < MAX_NEWTON; k++) {
-        end_pose(w, s, c);
-        const double open = joint_sides(w, s, c, k == 0);
-        if (k == 0 && !guess_is_near(w, s, c, open)) return 0;
-        if (open <= tol) {
-            sides_of_velocity(w, c);
-            return crm_passes_hold(w, s, c, HOLDS * w->settings.accept);
-        }
-        if (!(open < HALF * last)) return 0;
-        last = open;
-        if (k == 0 && crm_passes_begin(w, s, c, w->rows.left) < 0) return 0;
-        if (crm_pass(w, s, c, w->rows.left) < 0) return 0;
-    }
-    return 0;
-}
-
 /* Stage 1: M vh = M v0 + h/2 f + J0' l with gaps, slips and joints met at q1 = q0 + h vh. */
 static carom_status stage_1(carom_world *w, crm_substep *s)
 {
@@ -293,7 +206,7 @@ static carom_status stage_1(carom_world *w, crm_substep *s)
     crm_rows_at(w, s, s->q0);
     crm_solve_start(w, s, c);
     set_targets(w, s);
-    if (has_joints_alone(w, s) && close_joints(w, s, c)) return CAROM_OK;
+    if (crm_has_joints_alone(w, s) && crm_close_joints(w, s, c)) return CAROM_OK;
     first_sides(w, s, c);
     const carom_status e = crm_anderson_start(&w->memory, &w->anderson, n);
     return e < 0 ? e : iterate(w, s, c);
@@ -382,9 +295,9 @@ static carom_status stage_2(carom_world *w, crm_substep *s)
     }
     for (int k = 0; k < w->island->n_rows; k++) c->ce[k] = 0;
     crm_motor_sides(w, c);
-    const carom_status e = sees                     ? iterate_speed(w, s, c)
-                           : has_joints_alone(w, s) ? crm_solve_joints(w, s, c)
-                                                    : crm_solve_run(w, s, c, 1);
+    const carom_status e = sees                         ? iterate_speed(w, s, c)
+                           : crm_has_joints_alone(w, s) ? crm_solve_joints(w, s, c)
+                                                        : crm_solve_run(w, s, c, 1);
     if (e < 0) return e;
     crm_copy(w, s->v1, c->v);
     return sees ? e : CAROM_OK;

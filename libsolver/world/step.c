@@ -5,8 +5,8 @@
 
 /* Time below this fraction of a step is carried into the next one. */
 static const double CARRY_TOL = 1e-13;
-/* Held bodies times sub-steps of one frame; how many in flight are as much work as one that is held;
- * and sub-steps beyond all counting. */
+/* Held bodies times sub-steps of one frame; how many in flight are as much work as one that is
+ * held; and sub-steps beyond all counting. */
 enum { BODY_SUBSTEPS = 128, FLYING = 16, MAX_SUBSTEPS = 256 };
 /* How often contacts are added that only the end of a sub-step shows. */
 enum { MAX_LOOKS = 3 };
@@ -72,8 +72,8 @@ static int ends_early(const carom_world *w)
     return w->settings.tolerance > 0 || w->island->n_pairs || w->island->n_limited;
 }
 
-/* Sub-steps of the frame beyond this one: each solves for all bodies that contacts or joints hold, so
- * that large islands get fewer. */
+/* Sub-steps of the frame beyond this one: each solves for all bodies that contacts or joints hold,
+ * so that large islands get fewer. */
 static int substeps_left(const carom_world *w)
 {
     const int done = w->n_substeps - w->n_stiff + 1;
