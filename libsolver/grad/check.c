@@ -153,8 +153,7 @@ static double *anchor_number(crm_joint *j, int k)
     return anchors[k];
 }
 
-/* Number k of an array; NULL: the force of a step, which no world holds. */
-static double *number_of(carom_world *w, int array, size_t k)
+double *crm_number(carom_world *w, int array, size_t k)
 {
     switch (array) {
     case Q0: return &w->q[k];
@@ -189,8 +188,7 @@ static int joint_has(const crm_joint *j, int array)
     }
 }
 
-/* 0: the number means nothing for its body or joint, and its derivative is 0. */
-static int has_meaning(const carom_world *w, int array, size_t k)
+int crm_number_means(const carom_world *w, int array, size_t k)
 {
     const size_t n = 3 * (size_t)w->n_bodies;
     switch (array) {
@@ -215,8 +213,8 @@ static double size_of(const carom_world *w, int array, size_t k)
     case DT:
     case STIFFNESS:
     case DAMPING:
-    case MOTOR_LIMIT: return fabs(*number_of((carom_world *)w, array, k));
-    case RADIUS: return fmax(*number_of((carom_world *)w, array, k), 0.1 * w->length);
+    case MOTOR_LIMIT: return fabs(*crm_number((carom_world *)w, array, k));
+    case RADIUS: return fmax(*crm_number((carom_world *)w, array, k), 0.1 * w->length);
     case VERTICES:
     case ANCHORS: return w->length;
     case Q0: return k % 3 ? w->length : 1;
@@ -228,7 +226,7 @@ static double size_of(const carom_world *w, int array, size_t k)
 static int side_of(const carom_world *w, int array, size_t k, double step)
 {
     const int bounded = array == FRICTION || array == RESTITUTION || array == RADIUS;
-    const double x = bounded ? *number_of((carom_world *)w, array, k) : 0;
+    const double x = bounded ? *crm_number((carom_world *)w, array, k) : 0;
     if (bounded && x < step) return 1;
     return array == RESTITUTION && x > 1 - step ? -1 : 0;
 }
@@ -288,7 +286,7 @@ static carom_status probe(const checker *c, int array, size_t k, double by, doub
     *active = 0;
     if (e >= 0) e = carom_world_set_state(w, carom_tape_q(t, 0), carom_tape_v(t, 0));
     if (e >= 0) {
-        double *x = array < 0 ? NULL : number_of(w, array, k);
+        double *x = array < 0 ? NULL : crm_number(w, array, k);
         memset(w->force, 0, 3 * (size_t)w->n_bodies * sizeof(double));
         if (x) *x += by;
         e = carom_tape_create(w, NULL, &run);
@@ -360,10 +358,10 @@ static void choose(const carom_tape *t, const double *g, int array, int most,
 {
     const size_t n = crm_array_size(t->world, t->n_frames, array);
     size_t left = 0;
-    for (size_t k = 0; k < n; k++) left += has_meaning(t->world, array, k) != 0;
+    for (size_t k = 0; k < n; k++) left += crm_number_means(t->world, array, k) != 0;
     size_t wanted = most > 0 && (size_t)most < left ? (size_t)most : left;
     for (size_t k = 0; k < n && wanted > 0; k++) {
-        if (!has_meaning(t->world, array, k)) continue;
+        if (!crm_number_means(t->world, array, k)) continue;
         if (next_random(random) % left-- >= wanted) continue;
         wanted--;
         if (*count < capacity) {

@@ -268,6 +268,11 @@ double crm_border_acceleration(const carom_tape *t, int step, int k);
 /* CAROM_E_STATE, with a word, when parameters have changed since the recording. */
 carom_status crm_tape_current(const carom_tape *t);
 
+/* check.c: number k of a member of carom_gradient in a world; NULL: the force of a step, which no
+ * world holds. */
+double *crm_number(carom_world *w, int array, size_t k);
+/* 0: it means nothing for its body or joint, and its derivative is 0. */
+int crm_number_means(const carom_world *w, int array, size_t k);
 /* check.c: all that decides which smooth map a recorded run is, as a number. */
 unsigned long long crm_branch_of(const carom_tape *t);
 

@@ -2,7 +2,7 @@
 
 #include "near.h"
 
-#include "libsolver/world/internal.h" /* to move single numbers of a world */
+#include "libsolver/grad/internal.h" /* to move single numbers of a world */
 
 #include <stdlib.h>
 
@@ -49,74 +49,20 @@ int gradient_count(const carom_world *w, int array)
     }
 }
 
-static double *joint_number(crm_joint *j, int array)
+/* That of carom_gradient, which has the forces of steps behind the constant ones. */
+static int member(int array)
 {
-    switch (array) {
-    case BY_AXES: return &j->axis;
-    case BY_ANGLES: return &j->angle;
-    case BY_LENGTHS: return &j->length;
-    case BY_LOWER: return &j->lower;
-    case BY_UPPER: return &j->upper;
-    case BY_STIFFNESS: return &j->stiffness;
-    case BY_DAMPING: return &j->damping;
-    case BY_REST: return &j->rest;
-    case BY_MOTOR_SPEED: return &j->motor_speed;
-    default: return &j->motor_limit;
-    }
-}
-
-static double *anchor_number(crm_joint *j, int k)
-{
-    double *const anchors[4] = {&j->local_a.x, &j->local_a.y, &j->local_b.x, &j->local_b.y};
-    return anchors[k];
+    return array > BY_FORCE ? array + 1 : array;
 }
 
 double *gradient_number(carom_world *w, int array, int k)
 {
-    switch (array) {
-    case BY_Q0: return &w->q[k];
-    case BY_V0: return &w->v[k];
-    case BY_MASS: return &w->mass[k];
-    case BY_INERTIA: return &w->inertia[k];
-    case BY_FRICTION: return &w->friction[k];
-    case BY_RESTITUTION: return &w->restitution[k];
-    case BY_GRAVITY_SCALE: return &w->bodies[k].gravity_scale;
-    case BY_LINEAR_DAMPING: return &w->bodies[k].damping[1];
-    case BY_ANGULAR_DAMPING: return &w->bodies[k].damping[0];
-    case BY_GRAVITY: return &w->settings.gravity[k];
-    case BY_FORCE: return &w->force[k];
-    case BY_DT: return &w->settings.dt;
-    case BY_RADIUS: return &w->shapes[k].view.radius;
-    case BY_VERTICES: return k % 2 ? &w->vertices[k / 2].y : &w->vertices[k / 2].x;
-    case BY_ANCHORS: return anchor_number(&w->joints[k / 4], k % 4);
-    default: return joint_number(&w->joints[k], array);
-    }
-}
-
-static int joint_has(const crm_joint *j, int array)
-{
-    switch (array) {
-    case BY_LOWER: return j->lower > -HUGE_VAL;
-    case BY_UPPER: return j->upper < HUGE_VAL;
-    case BY_STIFFNESS: return j->stiffness > 0;
-    case BY_DAMPING: return j->damping > 0;
-    case BY_MOTOR_LIMIT: return j->motor_limit > 0;
-    default: return 1;
-    }
+    return crm_number(w, member(array), (size_t)k);
 }
 
 int gradient_has_meaning(const carom_world *w, int array, int k)
 {
-    switch (array) {
-    case BY_MASS:
-    case BY_GRAVITY_SCALE: return w->bodies[k].type == CAROM_DYNAMIC;
-    case BY_INERTIA: return w->bodies[k].type == CAROM_DYNAMIC && w->inertia[k] < HUGE_VAL;
-    case BY_LINEAR_DAMPING: return crm_is_damped(w, k, 1);
-    case BY_ANGULAR_DAMPING: return crm_is_damped(w, k, 0);
-    case BY_FORCE: return w->bodies[k / 3].type == CAROM_DYNAMIC;
-    case BY_V0: return w->bodies[k / 3].type != CAROM_STATIC;
-    default: return array <= BY_ANCHORS || joint_has(&w->joints[k], array);
-    }
+    return crm_number_means(w, member(array), (size_t)k);
 }
 
 gradient_room gradient_room_make(const carom_world *w, int rows)

@@ -36,8 +36,8 @@ typedef struct carom_contact_problem {
     const double *ce;      /* n_joint_rows, NULL: zero */
     const double *je_left; /* 6 n_joint_rows: rows of J_e v + c_e = 0 where they are not those along
                             * which impulses act, as in Newton's method on positions; NULL: je.
-                            * For carom_contact_start, _pass, _adjoint and _tangent (a direction's je
-                            * changes those that act); _solve and residuals want NULL */
+                            * For carom_contact_start, _pass, _adjoint and _tangent (a direction's
+                            * je changes those that act); _solve and residuals want NULL */
 } carom_contact_problem;
 
 typedef enum carom_contact_mode {

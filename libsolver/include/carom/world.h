@@ -52,7 +52,8 @@ typedef enum carom_combine {
     X(margin, double, 1e-6, "L", "gap below which a pair is in contact")                           \
     X(penetration, double, 1e-9, "L", "overlap below which a new contact needs no shorter step")   \
     X(rest_speed, double, 1e-3, "sqrt(g L)", "approach slower than this does not bounce")          \
-    X(max_substeps, int, 32, "1", "sub-steps of an island, at most; 128/bodies held in large ones") \
+    X(max_substeps, int, 32, "1",                                                                  \
+      "sub-steps of an island, at most; 128/bodies held in large ones")                            \
     X(threads, int, 1, "1", "among which islands are shared, 1 to 64: the same bits")              \
     X(sleep, int, 0, "", "1: what rests is not run until something changes; not on a tape")        \
     X(max_stiff, int, 256, "1", "sub-steps that stiff joints ask for, at most; 1: none")           \
