@@ -69,6 +69,15 @@ carom_status crm_solver_prepare(carom_contact_solver *c, const carom_contact_pro
     return s;
 }
 
+carom_status crm_solver_open(carom_contact_solver *c, const carom_contact_problem *p,
+                             const carom_contact_solution *x)
+{
+    carom_status s = crm_contact_check(p);
+    if (s >= 0) s = crm_solution_check(p, x);
+    if (s >= 0 && !crm_modes_valid(p, x->mode)) s = CAROM_E_ARGUMENT;
+    return s < 0 ? s : crm_solver_prepare(c, p);
+}
+
 /* Rows that no impulse can change must hold as they are. */
 static carom_status check_prescribed(carom_contact_solver *c, const carom_contact_problem *p,
                                      double speed)

@@ -1,4 +1,3 @@
-#include "libsolver/contact/check.h"
 #include "libsolver/contact/ladder/ladder.h"
 #include "libsolver/contact/solver.h"
 
@@ -23,10 +22,7 @@ carom_status carom_contact_modes(carom_contact_solver *solver, const carom_conta
 {
     const carom_contact_problem *p = problem;
     if (!solver) return CAROM_E_ARGUMENT;
-    carom_status s = crm_contact_check(p);
-    if (s >= 0) s = crm_solution_check(p, x);
-    if (s >= 0 && !crm_modes_valid(p, x->mode)) s = CAROM_E_ARGUMENT;
-    if (s >= 0) s = crm_solver_prepare(solver, p);
+    const carom_status s = crm_solver_open(solver, p, x);
     if (s < 0) return s;
     for (int i = 0; i < 3 * p->n_bodies; i++) x->v[i] = p->u[i];
     for (int k = 0; k < p->n_contacts; k++) x->ln[k] = x->lt[k] = 0;

@@ -1,4 +1,3 @@
-#include "libsolver/contact/check.h"
 #include "libsolver/contact/ladder/ladder.h"
 #include "libsolver/contact/residual.h"
 #include "libsolver/contact/solver.h"
@@ -89,10 +88,7 @@ carom_status carom_contact_start(carom_contact_solver *solver, const carom_conta
 {
     const carom_contact_problem *p = problem;
     if (!solver) return CAROM_E_ARGUMENT;
-    carom_status e = crm_contact_check(p);
-    if (e >= 0) e = crm_solution_check(p, x);
-    if (e >= 0 && !crm_modes_valid(p, x->mode)) e = CAROM_E_ARGUMENT;
-    if (e >= 0) e = crm_solver_prepare(solver, p);
+    const carom_status e = crm_solver_open(solver, p, x);
     if (e < 0) return e;
     for (int i = 0; i < solver->graph.n_islands; i++) {
         crm_system_gather(&solver->system, &solver->graph, p, i);

@@ -1,4 +1,3 @@
-#include "libsolver/contact/check.h"
 #include "libsolver/contact/ladder/ladder.h"
 #include "libsolver/contact/solver.h"
 
@@ -7,7 +6,7 @@
 /* On the central path the equations of contact k are, with W_k of (23) at the products kappa,
  *   dl = -W_k (J dv + dJ v + dc) + (0, dl_t / dmu) dmu,
  * so that in the adjoint  p + C' q = g,  B' W p = W_k^-T q  with both rows of the contact in B and
- * C. With P = p+^2 / kappa and Q = p-^2 / kappa the impulses alone give W_k, to all digits. */
+ * C. With P = p+^2 / kappa and Q = p-^2 / kappa the impulses alone give W_k. */
 
 void crm_take_modes(carom_contact_solver *c, int island, const carom_contact_solution *x)
 {
@@ -44,10 +43,7 @@ carom_status carom_contact_smooth(carom_contact_solver *solver,
 {
     const carom_contact_problem *p = problem;
     if (!solver || !(kappa > 0) || !(kappa < HUGE_VAL)) return CAROM_E_ARGUMENT;
-    carom_status e = crm_contact_check(p);
-    if (e >= 0) e = crm_solution_check(p, x);
-    if (e >= 0 && !crm_modes_valid(p, x->mode)) e = CAROM_E_ARGUMENT;
-    if (e >= 0) e = crm_solver_prepare(solver, p);
+    const carom_status e = crm_solver_open(solver, p, x);
     if (e < 0) return e;
     for (int i = 0; i < solver->graph.n_islands; i++) {
         if (!find_point(solver, p, kappa, i, x)) return CAROM_E_NO_SOLUTION;

@@ -22,6 +22,9 @@ struct carom_contact_solver {
 
 /* Graph, pattern and room for the problem. */
 carom_status crm_solver_prepare(carom_contact_solver *c, const carom_contact_problem *p);
+/* The same after a check of the problem and of a solution with its modes. */
+carom_status crm_solver_open(carom_contact_solver *c, const carom_contact_problem *p,
+                             const carom_contact_solution *x);
 /* The best point of every island, and what no island owns. */
 void crm_solver_write(carom_contact_solver *c, const carom_contact_problem *p,
                       carom_contact_solution *x);
