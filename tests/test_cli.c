@@ -287,6 +287,11 @@ static void explain_counts(void **state)
         if (!strstr(c.out, wanted[k])) fail_msg("no \"%s\" in\n%s", wanted[k], c.out);
     }
     program_free(&c);
+    /* two links and two hinges in a row: 4 blocks, and 2 for each of 3 neighbors, of 9 numbers */
+    c = program_run("explain %/scenes/f_double.json");
+    assert_int_equal(c.code, 0);
+    assert_non_null(strstr(c.out, "factor                     90  nonzeros"));
+    program_free(&c);
     /* no static body: no pair of them, without a sign */
     program_write("one.json", "{\"format\":\"carom-scene/1\",\"duration\":1,\"bodies\":["
                               "{\"mass\":1,\"shape\":{\"type\":\"circle\",\"radius\":1}}]}");

@@ -94,7 +94,7 @@ static void solve_island(job *j, int island)
     o->factorizations = s->factorizations;
     o->iterations = s->iterations;
     o->pivots = s->pivots;
-    o->blocks = s->factorizations ? 2 * (s->lu.lp[s->lu.n] - s->lu.lp[0]) + s->lu.n : 0;
+    o->blocks = s->factorizations ? crm_island_blocks(s) : 0;
     o->degenerate = o->status == CAROM_E_INFEASIBLE ? 0 : count_degenerate(s);
 }
 

@@ -99,12 +99,12 @@ carom_status carom_contact_start(carom_contact_solver *solver, const carom_conta
 }
 
 carom_status carom_contact_pass(carom_contact_solver *solver, const carom_contact_problem *problem,
-                                carom_contact_solution *x, int *factorizations)
+                                carom_contact_solution *x, carom_contact_stats *stats)
 {
     if (!solver || !solver->system_valid || !problem || !x) return CAROM_E_ARGUMENT;
     const crm_graph *g = &solver->graph;
     crm_system *y = &solver->system;
-    int n = 0;
+    carom_contact_stats own = {0};
     for (int i = 0; i < g->n_islands; i++) {
         crm_island *s = &y->island[i];
         const int before = s->factorizations;
@@ -114,9 +114,11 @@ carom_status carom_contact_pass(carom_contact_solver *solver, const carom_contac
         crm_island_factor(s, 1, s->compliance);
         crm_island_reduce(s, s->rhs, s->step);
         add_step(y, g, problem, s, i, x);
-        n += s->factorizations - before;
+        if (s->factorizations == before) continue;
+        own.factorizations++;
+        own.blocks += crm_island_blocks(s);
     }
-    if (factorizations) *factorizations = n;
+    if (stats) *stats = own;
     return CAROM_OK;
 }
 

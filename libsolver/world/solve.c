@@ -155,11 +155,12 @@ carom_status crm_pass(carom_world *w, const crm_substep *s, crm_solve *c, const 
 {
     carom_contact_problem p = crm_problem(w, s, c);
     carom_contact_solution x = {w->rows.v, c->ln, c->lt, c->le, c->mode};
-    int n = 0;
+    carom_contact_stats stats = {0};
     p.je_left = left;
-    const carom_status e = carom_contact_pass(crm_solver(w), &p, &x, &n);
-    w->effort += n;
-    w->stats->factorizations += n;
+    const carom_status e = carom_contact_pass(crm_solver(w), &p, &x, &stats);
+    w->effort += stats.factorizations;
+    w->stats->factorizations += stats.factorizations;
+    if (stats.blocks > 0) w->factor_blocks = stats.blocks;
     take_velocities(w, w->rows.v, c->v);
     return e;
 }

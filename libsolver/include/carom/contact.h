@@ -144,12 +144,12 @@ CAROM_API carom_status carom_contact_start(carom_contact_solver *solver,
  * problem nothing may have changed but cn, ct and ce.  v, ln, lt and le move; v - u - W J'l stays.
  * Rows that hold are then met to some 1e-10 of what they missed, also where they depend on each
  * other.  For Newton's method on what moves c: neither signs nor a residual are looked at, so end
- * with carom_contact_residual or a solve. A back-substitution; a factorization where the solve
- * needed none (*factorizations, may be NULL). No check but for CAROM_E_ARGUMENT before the first
- * solve. */
+ * with carom_contact_measure or a solve.  A back-substitution; a factorization where the solve
+ * needed none: stats (may be NULL) has its factorizations and blocks, and zeros.  No check but for
+ * CAROM_E_ARGUMENT before the first solve. */
 CAROM_API carom_status carom_contact_pass(carom_contact_solver *solver,
                                           const carom_contact_problem *problem,
-                                          carom_contact_solution *x, int *factorizations);
+                                          carom_contact_solution *x, carom_contact_stats *stats);
 
 /* Why the last solve ended in CAROM_E_INFEASIBLE (Farkas): yn >= 0 (n_contacts) and ye
  * (n_joint_rows) with W (J_n' yn + J_e' ye) = 0 and yn . (J_n u + c_n) + ye . (J_e u + c_e) < 0, so
