@@ -17,7 +17,7 @@ static carom_world *world(int sleep, double g)
     carom_world_settings set = carom_world_defaults();
     carom_world *w;
     set.sleep = sleep;
-    set.integrator = scene_integrator;
+    set.integrator = (int)scene_integrator;
     set.gravity[1] = -g;
     assert_int_equal(carom_world_create(&set, NULL, &w), CAROM_OK);
     return w;
