@@ -34,7 +34,7 @@ def precision_pieces():
 
 
 def step_pieces():
-    return [[str(k)] for k in range(11)]
+    return [[str(k)] for k in range(12)]
 
 
 def growth_pieces():
@@ -42,7 +42,7 @@ def growth_pieces():
 
 
 def phases_pieces():
-    return [["count", str(k)] for k in (2, 3, 4, 5, 6)]
+    return [["count", str(k)] for k in (2, 3, 4, 5, 11)]
 
 
 def whole():

@@ -46,7 +46,7 @@ typedef struct scene {
     int n_steps; /* steps on the clock */
 } scene;
 
-enum { N_SCENES = 11 };
+enum { N_SCENES = 12 };
 /* Scene k, 0 <= k < N_SCENES; memory exhausted ends the program. */
 scene make_scene(int k);
 void free_scene(scene *s);

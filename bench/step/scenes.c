@@ -128,6 +128,18 @@ static scene pyramid(const char *name, int base, int n_steps)
     return s;
 }
 
+/* The same, whose top box bears a pendulum: what stands is pressed anew in every step. */
+static scene loaded_pyramid(const char *name, int base, int n_steps)
+{
+    scene s = pyramid(name, base, n_steps);
+    const int top = s.n_bodies - 1;
+    scene_body bob = box(0.3, base - 0.9, 0.1, 0.1);
+    bob.shape = SHAPE_NONE;
+    pin(&s, top, add(&s, bob), 0, base - 0.5);
+    s.rests = 0;
+    return s;
+}
+
 /* 25 columns of discs with some play fall into a box. */
 static scene pile(const char *name, int n)
 {
@@ -173,7 +185,8 @@ scene make_scene(int k)
     case 7: return pyramid("pyramid 50 at rest", 50, 30);
     case 8: return pyramid("pyramid 100 at rest", 100, 10);
     case 9: return pile("pile of 1000 discs settling", 1000);
-    default: return many_free("1e5 free bodies", 100000);
+    case 10: return many_free("1e5 free bodies", 100000);
+    default: return loaded_pyramid("pyramid 20 under a pendulum", 20, 60);
     }
 }
 

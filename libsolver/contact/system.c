@@ -6,6 +6,9 @@
 #include <float.h>
 #include <math.h>
 
+/* Share of what is accepted that a velocity set to 0 may take [1]. */
+#define UNSEEN 0.01
+
 static void layout(crm_arena *a, crm_system *y, const crm_graph *g, const crm_block_pattern *s)
 {
     const int nz = s->lp[s->n];
@@ -330,20 +333,55 @@ void crm_system_set_modes(const crm_graph *g, crm_island *s, int island, const u
     }
 }
 
-/* v = u + V sqrt(W) w.  Where w differs from J' l by rounding of the velocity scale, it becomes
- * J' l: no row can see the change, and (4) then holds for small terms too. */
+/* Of a body that sticks to another: its row along n is no more exact than the one along t, so that
+ * its largest component sets the rounding, as far as the residual (22) does not see it: terms below
+ * `floor` are not judged. */
+static void share_rounding(const crm_island *s, int node, double floor, double *rounding)
+{
+    if (node < 0) return;
+    double *r = &rounding[3 * node];
+    const double *size = &s->size[3 * node];
+    const double most = CRM_ROUNDING * fmax(size[0], fmax(size[1], size[2]));
+    for (int i = 0; i < 3; i++) {
+        r[i] = size[i] <= floor ? most : fmin(most, UNSEEN * s->accept * size[i]);
+    }
+}
+
+/* Below what |v| is rounding of the terms of (4), where these are known. */
+static void find_rounding(const crm_island *s, double *rounding)
+{
+    double largest = 0;
+    for (int i = 0; i < 3 * s->nb; i++) {
+        rounding[i] = s->fresh ? CRM_ROUNDING * s->size[i] : 0;
+        largest = fmax(largest, s->size[i]);
+    }
+    for (int k = 0; s->fresh && k < s->nc; k++) {
+        const crm_contact *c = &s->contact[k];
+        if (s->best_mode[k] != CAROM_STICK || !(c->mu > 0) || !(s->best.n[k] > 0)) continue;
+        share_rounding(s, c->a, CRM_TERM_FLOOR * largest, rounding);
+        share_rounding(s, c->b, CRM_TERM_FLOOR * largest, rounding);
+    }
+}
+
+/* v = u + V sqrt(W) w, or 0 where that is no more than rounding: a body that nothing moves then
+ * stays where it is, to the last bit.  Where w differs from J' l by rounding of the velocity scale,
+ * it becomes J' l: no row can see the change, and (4) then holds for small terms too. */
 static void write_motion(const crm_system *y, const crm_graph *g, const carom_contact_problem *p,
                          const crm_island *s, int island, double *v)
 {
     double *defect = s->rest.z;
+    double *rounding = s->step.z;
     crm_island_defect(s, s->best, defect);
+    find_rounding(s, rounding);
     for (int b = 0; b < s->nb; b++) {
         const int body = g->body_of[g->node_ptr[island] + b];
         for (int i = 0; i < 3; i++) {
-            const double d = defect[3 * b + i];
-            const double w = s->best.z[3 * b + i] + (fabs(d) <= CRM_ROUNDING ? d : 0);
+            const int at = 3 * b + i;
+            const double d = defect[at];
+            const double w = s->best.z[at] + (fabs(d) <= CRM_ROUNDING ? d : 0);
             const double root = y->root[3 * (g->node_ptr[island] + b) + i];
-            v[3 * body + i] = p->u[3 * body + i] + y->speed[island] * root * w;
+            const int rests = root > 0 && fabs(s->free[at] + w) <= rounding[at];
+            v[3 * body + i] = rests ? 0 : p->u[3 * body + i] + y->speed[island] * root * w;
         }
     }
 }

@@ -11,6 +11,7 @@ int crm_joint_breaks(const crm_joint *j)
 static void drop(carom_world *w, crm_joint *j)
 {
     j->broken = 1;
+    crm_sleep_forget(w);
     for (int r = j->first_row; r < j->first_row + j->n_rows; r++) {
         w->joint_force[0][r] = w->joint_force[1][r] = w->joint_total[r] = 0;
     }

@@ -101,16 +101,34 @@ static int one_mode(const carom_world *w, int n_inner)
     return 1;
 }
 
-/* q1, v1 = sum over columns of c_n T_n. */
+/* Its last sub-step ends at T_n. */
+static const crm_substep *end_of_column(const carom_world *w, int n)
+{
+    return &w->inner[n * (n + 1) / 2 - 1];
+}
+
+/* to += c (value - finest) */
+static void add_difference(const carom_world *w, double *to, double c, const double *value,
+                           const double *finest)
+{
+    for (int i = 0; i < w->island->n_bodies; i++) {
+        const int at = 3 * w->island->bodies[i];
+        for (int k = at; k < at + 3; k++) to[k] += c * (value[k] - finest[k]);
+    }
+}
+
+/* q1, v1 = sum over columns of c_n T_n, as T_N + sum of c_n (T_n - T_N): the c_n, up to 60, then
+ * magnify the rounding of what columns differ by, not of where the bodies are. */
 static void combine(carom_world *w, int columns)
 {
     crm_substep *s = &w->sub;
-    crm_zero(w, s->q1);
-    crm_zero(w, s->v1);
-    for (int n = 1; n <= columns; n++) {
-        const crm_substep *last = &w->inner[n * (n + 1) / 2 - 1];
-        crm_move(w, s->q1, last->q1, s->weight[n - 1]);
-        crm_move(w, s->v1, last->v1, s->weight[n - 1]);
+    const crm_substep *finest = end_of_column(w, columns);
+    crm_copy(w, s->q1, finest->q1);
+    crm_copy(w, s->v1, finest->v1);
+    for (int n = 1; n < columns; n++) {
+        const crm_substep *end = end_of_column(w, n);
+        add_difference(w, s->q1, s->weight[n - 1], end->q1, finest->q1);
+        add_difference(w, s->v1, s->weight[n - 1], end->v1, finest->v1);
     }
 }
 
@@ -121,11 +139,12 @@ static double apart(const carom_world *w, int columns)
     double largest = 0;
     for (int i = 0; i < w->island->n_bodies; i++) {
         const int b = w->island->bodies[i];
+        const double *finest = &end_of_column(w, columns)->q1[3 * b];
         double d[3] = {0, 0, 0};
-        for (int n = 1; n <= columns; n++) {
-            const double *q = &w->inner[n * (n + 1) / 2 - 1].q1[3 * b];
+        for (int n = 1; n < columns; n++) {
+            const double *q = &end_of_column(w, n)->q1[3 * b];
             const double c = weight(n, 1, columns) - (n > 1 ? weight(n, 2, columns) : 0);
-            for (int k = 0; k < 3; k++) d[k] += c * q[k];
+            for (int k = 0; k < 3; k++) d[k] += c * (q[k] - finest[k]);
         }
         const double reach = w->bodies[b].reach;
         largest = fmax(largest, hypot(d[1], d[2]) + reach * fabs(d[0]));
@@ -148,7 +167,7 @@ static double estimate(const carom_world *w, int k)
 static void show(carom_world *w, int columns)
 {
     crm_substep *s = &w->sub;
-    const crm_substep *last = &w->inner[columns * (columns + 1) / 2 - 1];
+    const crm_substep *last = end_of_column(w, columns);
     for (int i = 0; i < 2; i++) {
         s->solve[i].kind = last->solve[i].kind;
         for (int k = 0; k < s->n_contacts; k++) s->solve[i].mode[k] = last->solve[i].mode[k];

@@ -1,4 +1,4 @@
-/* sleep.c: islands at rest that are not run again.  docs/step.md, section "Sleep". */
+/* sleep.c: islands at rest that are not run again.  docs/step.md, section "Rest". */
 #include "world/internal.h"
 
 /* Impulses of two steps of the same rest differ by no more than this [largest of the island]. */
@@ -10,13 +10,16 @@ struct crm_rest {
     long step; /* the last one that left it so */
     long revision;
     int first, n_bodies, n_pairs; /* of its island */
+    int n_substeps, degenerate;   /* of the step that put it to rest, to be told again */
+    double residual;
     double q[3], force[3];
 };
 
+/* Free flight never rests, and keeps nothing. */
 carom_status crm_sleep_create(carom_world *w)
 {
     const size_t rows = 3 * (size_t)w->n_joint_rows;
-    if (!w->settings.sleep) return CAROM_OK;
+    if (!w->settings.sleep && !w->plan.solver) return CAROM_OK;
     w->rest = crm_new(&w->memory, (size_t)w->n_bodies, sizeof *w->rest);
     if (w->rest && rows) w->rest_forces = crm_new(&w->memory, rows, sizeof *w->rest_forces);
     return w->rest && (w->rest_forces || !rows) ? CAROM_OK : CAROM_E_MEMORY;
@@ -73,6 +76,9 @@ static void mark(carom_world *w, int rests)
         r->first = i->bodies[0];
         r->n_bodies = i->n_bodies;
         r->n_pairs = i->n_pairs;
+        r->n_substeps = w->n_substeps;
+        r->degenerate = w->stats->degenerate;
+        r->residual = w->stats->residual;
         memcpy(r->q, &w->q[3 * b], sizeof r->q);
         memcpy(r->force, &w->step_force[3 * b], sizeof r->force);
     }
@@ -95,6 +101,13 @@ static carom_status keep_touches(carom_world *w)
     return CAROM_OK;
 }
 
+/* Free flight is run as it is; recorded steps are run. */
+static int may_rest(const carom_world *w)
+{
+    const int held = w->island->n_pairs > 0 || w->island->n_joints > 0;
+    return w->rest && !w->recorder.substep && (held || w->settings.sleep);
+}
+
 /* Joint forces of the island before the step, for crm_sleep_settle. */
 static void save_forces(carom_world *w)
 {
@@ -108,18 +121,31 @@ static void save_forces(carom_world *w)
     }
 }
 
+/* The figures of the step that put the island to rest, which would be those of this one. */
+static void tell_again(carom_world *w)
+{
+    const crm_island *i = w->island;
+    const crm_rest *r = &w->rest[i->bodies[0]];
+    carom_step_stats *t = w->stats;
+    w->n_substeps = r->n_substeps;
+    t->n_substeps = r->n_substeps;
+    t->degenerate = r->degenerate;
+    t->residual = r->residual;
+    *(w->settings.sleep ? &t->n_asleep : &t->n_still) += i->n_bodies;
+}
+
 carom_status crm_sleep_on(carom_world *w, int *asleep)
 {
     const crm_island *i = w->island;
     *asleep = 0;
-    if (!w->rest || w->recorder.substep) return CAROM_OK;
+    if (!may_rest(w)) return CAROM_OK;
     if (i->n_rows) save_forces(w);
     for (int k = 0; k < i->n_bodies; k++) {
         if (!sleeps(w, i->bodies[k])) return CAROM_OK;
     }
     *asleep = 1;
+    tell_again(w);
     mark(w, 1);
-    w->stats->n_asleep += i->n_bodies;
     return keep_touches(w);
 }
 
@@ -138,11 +164,18 @@ static int barely_moves(const carom_world *w, int b, double slow)
            hypot(v1[1], v1[2]) + reach * fabs(v1[0]) <= slow;
 }
 
+/* Steps from here would differ by nothing but the state. */
+static int may_settle(const carom_world *w)
+{
+    const crm_island *i = w->island;
+    return w->stats->status == CAROM_OK && !i->n_limited && !i->n_driven && !w->n_fields;
+}
+
 static int rests(const carom_world *w)
 {
     const crm_island *i = w->island;
     const double slow = CRM_REST_TOL * w->speed;
-    if (w->stats->status != CAROM_OK || i->n_limited || i->n_driven || w->n_fields) return 0;
+    if (!may_settle(w)) return 0;
     for (int k = 0; k < i->n_bodies; k++) {
         if (!barely_moves(w, i->bodies[k], slow)) return 0;
     }
@@ -217,9 +250,79 @@ static void keep_old_touches(carom_world *w)
     }
 }
 
+static int same_bits(const carom_world *w, const double *a, const double *b)
+{
+    for (int k = 0; k < w->island->n_bodies; k++) {
+        const int at = 3 * w->island->bodies[k];
+        if (memcmp(&a[at], &b[at], 3 * sizeof *a)) return 0;
+    }
+    return 1;
+}
+
+static int owes_time(const carom_world *w)
+{
+    for (int k = 0; k < w->island->n_bodies; k++) {
+        const int b = w->island->bodies[k];
+        if (w->carry[b] != 0 || w->owes[b]) return 1;
+    }
+    return 0;
+}
+
+static int same_joint_forces(const carom_world *w)
+{
+    const double *all[3] = {w->joint_force[0], w->joint_force[1], w->joint_total};
+    for (int k = 0; k < w->island->n_joints; k++) {
+        const crm_joint *j = &w->joints[w->island->joints[k]];
+        for (int i = 0; i < 3; i++) {
+            if (memcmp(&all[i][j->first_row], &w->rest_forces[i * w->n_joint_rows + j->first_row],
+                       (size_t)j->n_rows * sizeof(double)))
+                return 0;
+        }
+    }
+    return 1;
+}
+
+/* What the next step starts from, besides the state. */
+static int same_guess(const crm_touch *a, const crm_touch *b)
+{
+    return crm_recipe_same(a->contact.recipe, b->contact.recipe) && a->mode == b->mode &&
+           !memcmp(a->force_n, b->force_n, sizeof a->force_n) &&
+           !memcmp(a->force_t, b->force_t, sizeof a->force_t);
+}
+
+/* The touches of the island are the old ones, all of them, in the same order. */
+static int same_guesses(const carom_world *w)
+{
+    const crm_touch *now = w->next.list + w->first_touch;
+    int left = w->next.n - w->first_touch;
+    for (int k = 0; k < w->island->n_pairs; k++) {
+        int n;
+        const crm_touch *old = crm_touches_of(w, w->island->pairs[k], &n);
+        if (n > left) return 0;
+        for (int i = 0; i < n; i++) {
+            if (!same_guess(&old[i], &now[i])) return 0;
+        }
+        now += n;
+        left -= n;
+    }
+    return left == 0;
+}
+
+/* The step has given the bits that it started from: the next one would do so, too. */
+static int is_still_island(const carom_world *w)
+{
+    return may_settle(w) && all_still(w, w->v) && all_still(w, w->v_saved) &&
+           same_bits(w, w->q, w->q_saved) && !owes_time(w) && same_joint_forces(w) &&
+           same_guesses(w);
+}
+
 void crm_sleep_settle(carom_world *w)
 {
-    if (!w->rest || w->recorder.substep) return;
+    if (!may_rest(w)) return;
+    if (!w->settings.sleep) {
+        mark(w, is_still_island(w));
+        return;
+    }
     if (!rests(w)) {
         mark(w, 0);
         return;

@@ -353,7 +353,7 @@ static crm_touch touch_of(const crm_substep *s, int k)
 {
     const crm_contact *c = &s->contacts[k];
     const crm_solve *x = s->solve;
-    crm_touch t = {*c, {0, 0}, 0, 0, {0, 0}, {0, 0}, x[0].mode[k]};
+    crm_touch t = {*c, {0, 0}, 0, 0, {0, 0}, {0, 0}, x[0].mode[k], 0};
     t.point.x = s->q0[3 * c->body_a + 1] + c->arm_a.x;
     t.point.y = s->q0[3 * c->body_a + 2] + c->arm_a.y;
     t.ln = whole(s, x[0].ln[k], x[1].ln[k]);
@@ -431,15 +431,14 @@ void crm_forget_guesses(carom_world *w)
     if (w->joint_total) memset(w->joint_total, 0, bytes);
 }
 
-/* By shape pair; contacts of one pair keep their order, for they are next to each other. */
+/* By shape pair; contacts of one pair, all of one island, keep their order. */
 static int compare_touches(const void *x, const void *y)
 {
     const crm_touch *a = x;
     const crm_touch *b = y;
     if (before(a, &b->contact)) return -1;
     if (before(b, &a->contact)) return 1;
-    return (a->contact.recipe.inc > b->contact.recipe.inc) -
-           (a->contact.recipe.inc < b->contact.recipe.inc);
+    return (a->at > b->at) - (a->at < b->at);
 }
 
 void crm_touches_turn(carom_world *w)
@@ -451,6 +450,7 @@ void crm_touches_turn(carom_world *w)
     crm_touches *t = &w->touches;
     for (int k = 1; k < t->n; k++) {
         if (!before(&t->list[k], &t->list[k - 1].contact)) continue;
+        for (int i = 0; i < t->n; i++) t->list[i].at = i;
         qsort(t->list, (size_t)t->n, sizeof *t->list, compare_touches);
         return;
     }

@@ -35,6 +35,7 @@ void crm_stats_add(carom_step_stats *sum, const carom_step_stats *part)
     sum->iterations += part->iterations;
     sum->degenerate += part->degenerate;
     sum->n_asleep += part->n_asleep;
+    sum->n_still += part->n_still;
 }
 
 #ifdef CRM_THREADS

@@ -228,6 +228,7 @@ typedef struct crm_touch {
     double ln, lt;
     double force_n[2], force_t[2]; /* impulses per time of the first two solves [N] */
     unsigned char mode;
+    int at; /* in the list, before it is ordered */
 } crm_touch;
 
 /* Touches ordered by shape pair: those of the last frame, and those of the frame under way in the

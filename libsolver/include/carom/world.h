@@ -226,6 +226,7 @@ typedef struct carom_step_stats {
     double energy;      /* kinetic + gravitational at the end [J] */
     int n_islands;      /* groups of bodies that advanced alone */
     int n_asleep;       /* bodies at rest that were not run; setting sleep */
+    int n_still;        /* bodies not run, whose last step has changed no bit of their island */
     int n_candidates;   /* pairs that may touch within the step */
     int n_contacts;     /* contact points of the islands' last sub-steps */
     int n_substeps;     /* of the busiest island */

@@ -1,0 +1,206 @@
+/* Islands that a step leaves as they are, to the last bit, are not run again: the bits are those of
+ * a world that runs every step, which one on a tape does. */
+#include "near.h"
+#include "scenes.h"
+
+#include "carom/events.h"
+#include "carom/grad.h"
+
+#include <string.h>
+
+enum { BASE = 6, SETTLE = 20, MAX_BODIES = 64 };
+
+/* A pyramid, a pendulum that hangs, a ball that bounces for good. */
+static carom_world *rests(void)
+{
+    carom_world *w = scene_world(9.81, 1.0 / 60);
+    const int floor = scene_floor(w, 0.5, 0);
+    for (int row = 0; row < BASE; row++) {
+        for (int k = 0; k < BASE - row; k++) {
+            const carom_pose pose = {0, k - 0.5 * (BASE - row - 1), row + 0.5};
+            scene_box(w, 1, 0.45, 0.5, pose, 0.5, 0);
+        }
+    }
+    const int bob = scene_disc(w, 1, 0.25, -8, 2, 0.5, 0);
+    assert_int_equal(carom_world_add_revolute(w, floor, bob, (carom_vec2){-8, 4}, NULL), CAROM_OK);
+    scene_disc(w, 1, 0.25, 9, 3, 0.5, 1);
+    assert_int_equal(carom_world_record_events(w, 1), CAROM_OK);
+    return w;
+}
+
+static void assert_same_contacts(const carom_world *a, const carom_world *b)
+{
+    const int n = carom_world_n_contacts(a);
+    assert_int_equal(n, carom_world_n_contacts(b));
+    for (int k = 0; k < n; k++) {
+        const carom_contact_info x = carom_world_contact(a, k);
+        const carom_contact_info y = carom_world_contact(b, k);
+        assert_int_equal(x.mode, y.mode);
+        assert_true(x.ln == y.ln && x.lt == y.lt && x.gap == y.gap);
+        assert_true(x.point.x == y.point.x && x.point.y == y.point.y);
+    }
+}
+
+static void assert_same(const carom_world *a, const carom_world *b, const carom_step_stats *s,
+                        const carom_step_stats *t)
+{
+    const size_t bytes = 3 * (size_t)carom_world_n_bodies(a) * sizeof(double);
+    assert_memory_equal(carom_world_q(a), carom_world_q(b), bytes);
+    assert_memory_equal(carom_world_v(a), carom_world_v(b), bytes);
+    assert_same_contacts(a, b);
+    const carom_joint_force f = carom_world_joint_force(a, 0);
+    const carom_joint_force g = carom_world_joint_force(b, 0);
+    assert_true(f.force.x == g.force.x && f.force.y == g.force.y);
+    assert_int_equal(s->n_contacts, t->n_contacts);
+    assert_int_equal(s->n_substeps, t->n_substeps);
+    assert_int_equal(s->degenerate, t->degenerate);
+    assert_true(s->residual == t->residual && s->energy == t->energy);
+    assert_true(s->penetration == t->penetration && s->joint_drift == t->joint_drift);
+    int n;
+    int m;
+    carom_world_events(a, &n);
+    carom_world_events(b, &m);
+    assert_int_equal(n, m);
+}
+
+/* Everything but the ball is left out once it has settled, and again after a push on the top. */
+static void bits_are_those_of_every_step(void **state)
+{
+    (void)state;
+    carom_world *w = rests();
+    carom_world *run = rests();
+    carom_tape *tape;
+    carom_step_stats s;
+    carom_step_stats t;
+    double force[3 * MAX_BODIES] = {0};
+    const int n_held = carom_world_n_bodies(w) - 2; /* without the floor and the ball */
+    const int top = BASE * (BASE + 1) / 2;
+    assert_int_equal(carom_tape_create(run, NULL, &tape), CAROM_OK);
+    int n_still = 0;
+    for (int k = 0; k < 6 * SETTLE; k++) {
+        force[3 * top + 2] = k == 3 * SETTLE ? -5 : 0;
+        assert_true(carom_world_step(w, force, &s) >= 0);
+        assert_true(carom_tape_step(tape, force, &t) >= 0);
+        assert_int_equal(t.n_still, 0);
+        assert_same(w, run, &s, &t);
+        if (k == 3 * SETTLE) assert_int_equal(s.n_still, 1); /* the bob */
+        n_still += s.n_still == n_held;
+    }
+    assert_true(n_still > 3 * SETTLE);
+    assert_int_equal(s.n_still, n_held);
+    carom_tape_destroy(tape);
+    carom_world_destroy(w);
+    carom_world_destroy(run);
+}
+
+/* Next to the fastest of balls: what is still joins its island before it can touch. */
+static void a_hit_is_felt(void **state)
+{
+    (void)state;
+    carom_world *w = rests();
+    carom_world *run = rests();
+    carom_tape *tape;
+    carom_step_stats s;
+    carom_step_stats t;
+    const int ball = carom_world_n_bodies(w) - 1;
+    scene_run(w, 2 * SETTLE, &s);
+    assert_true(s.n_still > 0);
+    assert_int_equal(carom_tape_create(run, NULL, &tape), CAROM_OK);
+    for (int k = 0; k < 2 * SETTLE; k++) assert_true(carom_tape_step(tape, NULL, NULL) >= 0);
+    scene_push(w, ball, 0, -80, 0);
+    carom_tape_destroy(tape);
+    scene_push(run, ball, 0, -80, 0);
+    assert_int_equal(carom_tape_create(run, NULL, &tape), CAROM_OK);
+    for (int k = 0; k < SETTLE; k++) {
+        assert_true(carom_world_step(w, NULL, &s) >= 0);
+        assert_true(carom_tape_step(tape, NULL, &t) >= 0);
+        assert_same(w, run, &s, &t);
+    }
+    carom_tape_destroy(tape);
+    carom_world_destroy(w);
+    carom_world_destroy(run);
+}
+
+/* Slow is not still: without friction a box under gravity slides on at 1e-15 m/s, and at 1e-150. */
+static void the_slow_moves_on(void **state)
+{
+    (void)state;
+    const double speed[] = {1e-15, 1e-150};
+    for (int i = 0; i < 2; i++) {
+        carom_world *w = scene_world(9.81, 1.0 / 60);
+        carom_step_stats s;
+        scene_floor(w, 0, 0);
+        const int box = scene_box(w, 1, 0.5, 0.5, (carom_pose){0, 0, 0.5}, 0, 0);
+        scene_push(w, box, 0, speed[i], 0);
+        for (int k = 1; k <= SETTLE; k++) {
+            scene_run(w, 1, &s);
+            assert_int_equal(s.n_still, 0);
+            assert_near(carom_world_q(w)[3 * box + 1], k * speed[i] / 60, 1e-12 * speed[i]);
+        }
+        carom_world_destroy(w);
+    }
+}
+
+/* At the top of its throw a ball is at rest for a moment only. */
+static void a_moment_is_no_rest(void **state)
+{
+    (void)state;
+    carom_world *w = scene_world(8, 1.0 / 64);
+    const int floor = scene_floor(w, 0, 0);
+    (void)floor;
+    const int ball = scene_disc(w, 1, 0.25, 0, 0.25, 0, 0);
+    carom_step_stats s;
+    scene_push(w, ball, 0, 0, 4);
+    for (int k = 1; k <= 60; k++) {
+        const double t = k / 64.0;
+        scene_run(w, 1, &s);
+        assert_int_equal(s.n_still, 0);
+        assert_near(carom_world_q(w)[3 * ball + 2], 0.25 + 4 * t - 4 * t * t, 1e-12);
+    }
+    carom_world_destroy(w);
+}
+
+static int euler(void **state)
+{
+    (void)state;
+    scene_integrator = CAROM_EULER;
+    return 0;
+}
+
+static int located(void **state)
+{
+    (void)state;
+    scene_integrator = CAROM_LOCATED;
+    return 0;
+}
+
+static int fixed(void **state)
+{
+    (void)state;
+    scene_integrator = CAROM_FIXED;
+    return 0;
+}
+
+static int order_4(void **state)
+{
+    (void)state;
+    scene_integrator = CAROM_LOCATED;
+    scene_order = 4;
+    return 0;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(bits_are_those_of_every_step, euler),
+        cmocka_unit_test_setup(bits_are_those_of_every_step, located),
+        cmocka_unit_test_setup(bits_are_those_of_every_step, fixed),
+        cmocka_unit_test_setup(a_hit_is_felt, euler),
+        cmocka_unit_test_setup(a_hit_is_felt, located),
+        cmocka_unit_test_setup(a_hit_is_felt, fixed),
+        cmocka_unit_test_setup(the_slow_moves_on, located),
+        cmocka_unit_test_setup(a_moment_is_no_rest, located),
+        cmocka_unit_test_setup(bits_are_those_of_every_step, order_4),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
