@@ -334,8 +334,10 @@ int crm_has_joints_alone(const carom_world *w, const crm_substep *s);
 int crm_close_joints(carom_world *w, crm_substep *s, crm_solve *c);
 /* smooth.c: whether forces on the island depend on velocities that stage 2 is to find. */
 int crm_sees_speed(const carom_world *w);
-/* smooth.c; plastic: without restitution, CAROM_LIMIT. */
+/* impact.c; plastic: without restitution, CAROM_LIMIT. */
 carom_status crm_impact(carom_world *w, int plastic);
+/* impact.c: stage 2 of a sub-step that located no impacts; *done = 0: nothing bounces. */
+carom_status crm_bounce(carom_world *w, crm_substep *s, int *done);
 /* The map of the sub-step under way, sub.map, over h; sub.met is its status. */
 carom_status crm_map_run(carom_world *w, double h);
 /* Corrects sub.q1 until no contact of sub overlaps and no joint drifts; the corrections are solves

@@ -167,13 +167,14 @@ static carom_status try_substep(carom_world *w, double span, int last)
     return e;
 }
 
-/* Joints that turn out too stiff for the span are given a shorter one. */
+/* Joints that turn out too stiff for the span are given a shorter one, while there is strength. */
 static carom_status run_stable(carom_world *w, double left, int last, double *span)
 {
     const carom_status before = w->stats->status;
-    *span = last ? left : crm_stiff_span(w, left, 0);
+    const int whole = last || w->effort >= CRM_WORN;
+    *span = whole ? left : crm_stiff_span(w, left, 0);
     carom_status e = try_substep(w, *span, last);
-    while (e >= 0 && !last) {
+    while (e >= 0 && !whole && w->effort < CRM_WORN) {
         const double next = crm_stiff_span(w, left, 1);
         if (!(next < 0.75 * fmin(*span, w->sub.h))) break;
         w->stats->status = before;
