@@ -3,8 +3,9 @@
  *
  * Usage: bench_growth [--quick] [family]: prints CSV: family, contender, bodies, contacts, seconds
  * per step (wall time: threads count), steps on the clock, factorizations per step, bytes held,
- * nonzeros of the factor, worst status.  A cell whose step is expected to take longer than the
- * budget is left out, and said on stderr.  A comment gives the bandwidth of memory. */
+ * nonzeros and flops of one factorization, worst status.  A cell whose step is expected to take
+ * longer than the budget is left out, and said on stderr.  Comments give the bandwidth of memory and
+ * the rate of arithmetic. */
 #include "bench/step/own.h"
 
 #include "carom/world.h"
@@ -55,11 +56,10 @@ static int is_own(const contender *c)
     return strncmp(c->name, "carom", 5) == 0;
 }
 
-/* Seconds per step; 0 where the scene cannot be so large. */
+/* Seconds per step. */
 static double cell(int family, int n, const contender *c, double budget)
 {
     scene s = make_family(family, n);
-    if (!s.n_bodies) return 0;
     void *self = c->create(&s);
     counters count = {0};
     for (int k = 0; k < WARM_UP; k++) c->step(self, &count);
@@ -74,9 +74,10 @@ static double cell(int family, int n, const contender *c, double budget)
     }
     carom_world_size z = {0};
     if (is_own(c)) z = carom_world_measure(self);
-    printf("%s,%s,%d,%d,%.3e,%d,%.3g,%zu,%d,%d\n", FAMILY_NAMES[family], c->name, s.n_bodies,
-           count.n_contacts, spent / steps, steps, (double)count.factorizations / steps, z.bytes,
-           z.factor_nonzeros, count.worst);
+    printf("%s,%s,%d,%d,%.3e,%d,%.3g,%zu,%.0f,%.0f,%d\n", FAMILY_NAMES[family], c->name,
+           s.n_bodies, count.n_contacts, spent / steps, steps,
+           (double)count.factorizations / steps, z.bytes, z.factor.nonzeros, z.factor.flops,
+           count.worst);
     fflush(stdout);
     c->destroy(self);
     free_scene(&s);
@@ -114,14 +115,37 @@ static double bandwidth(void)
     return 2 * (double)bytes / best;
 }
 
+/* Flops per second of y += a x within the nearest cache, as this compiler makes it. */
+static double arithmetic_rate(void)
+{
+    enum { N = 512, TIMES = 20000 };
+    double x[N];
+    double y[N];
+    double best = HUGE_VAL;
+    volatile double seen = 0;
+    for (int k = 0; k < N; k++) x[k] = y[k] = 1.0 / (k + 1);
+    for (int round = 0; round < 5; round++) {
+        const double from = now();
+        for (int t = 0; t < TIMES; t++) {
+            const double a = 1e-9 * t;
+            for (int k = 0; k < N; k++) y[k] += a * x[k];
+        }
+        seen = seen + y[round];
+        best = fmin(best, now() - from);
+    }
+    return 2.0 * N * TIMES / best;
+}
+
 int main(int argc, char **argv)
 {
     contender list[MAX_CONTENDERS];
     const int n = contenders(list);
     const int quick = argc > 1 && strcmp(argv[1], "--quick") == 0;
     const char *only = argc > 1 + quick ? argv[1 + quick] : NULL;
-    printf("family,contender,bodies,contacts,seconds,steps,factorizations,bytes,nonzeros,status\n");
+    printf("family,contender,bodies,contacts,seconds,steps,factorizations,bytes,nonzeros,"
+           "flops,status\n");
     printf("# bandwidth %.3g\n", bandwidth());
+    printf("# arithmetic %.3g\n", arithmetic_rate());
     for (int k = 0; k < N_FAMILIES; k++) {
         if (only && strcmp(only, FAMILY_NAMES[k]) != 0) continue;
         for (int i = 0; i < n; i++) grow(k, &list[i], quick ? BUDGET_QUICK : BUDGET);

@@ -95,11 +95,9 @@ static void read_joint(scene *s, const json_t *joint, const char *path)
 {
     const json_t *anchor = json_object_get(joint, "anchor");
     const char *type = json_string_value(json_object_get(joint, "type"));
-    const scene_pin p = {(int)number(joint, "body_a"), (int)number(joint, "body_b"),
-                         coordinate(anchor, 0), coordinate(anchor, 1)};
     must(type && strcmp(type, "revolute") == 0, path, "a joint is not revolute");
-    must(s->n_pins < MAX_PINS, path, "too many joints");
-    s->pins[s->n_pins++] = p;
+    add_pin(s, (int)number(joint, "body_a"), (int)number(joint, "body_b"), coordinate(anchor, 0),
+            coordinate(anchor, 1));
 }
 
 /* --- ends ----------------------------------------------------------------------------------- */

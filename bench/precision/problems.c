@@ -55,9 +55,8 @@ static int links(scene *s, int n, double first, double more)
     s->bodies[before].shape = SHAPE_NONE;
     for (int k = 0; k < n; k++) {
         const double a = first + more * k;
-        const scene_pin p = {before, before + 1, x, y};
+        add_pin(s, before, before + 1, x, y);
         before = box(s, 0.05, 0.5, a, x + 0.5 * sin(a), y - 0.5 * cos(a), 0);
-        s->pins[s->n_pins++] = p;
         x += sin(a);
         y -= cos(a);
     }
@@ -301,11 +300,10 @@ static problem heavy_chain(void)
     problem p = {
         "heavy ball on 100 links", make("heavy chain"), 1.0, 0, 0.5, MOTION_CLOSED, {0}, 0, 0, 0};
     const int last = links(&p.s, 100, 0, 0);
-    const scene_pin pin = {last, last + 1, 0, -100};
     p.body = disc(&p.s, 0.5, 0, -100.5, 0, 0);
     p.s.bodies[p.body].mass = 1e4 * p.s.bodies[last].mass;
     p.s.bodies[p.body].inertia = 0.125 * p.s.bodies[p.body].mass;
-    p.s.pins[p.s.n_pins++] = pin;
+    add_pin(&p.s, last, p.body, 0, -100);
     rests(&p);
     return p;
 }
@@ -364,7 +362,5 @@ problem make_problem(int k)
 
 void free_problem(problem *p)
 {
-    for (int k = 0; p->s.polygons && k < p->s.n_bodies; k++) free(p->s.polygons[k].corners);
-    free(p->s.polygons);
-    free(p->s.bodies);
+    free_scene(&p->s);
 }

@@ -23,7 +23,7 @@ N_PRECISION = 21
 # with a reference: a pile has none
 SCENE_FILES = sorted(path for path in glob.glob(os.path.join(ROOT, "tests", "data", "scenes", "*.json"))
                      if not os.path.basename(path).startswith("j_"))
-GROWTH = ("free", "chain", "stack", "pyramid", "pile", "islands", "hub")
+GROWTH = ("free", "chain", "stack", "pyramid", "pile", "islands", "rest", "hub")
 
 
 # A piece is one command; `scene` pipes a scene of the program into a script of the peers' Python; `count`

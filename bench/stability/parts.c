@@ -23,9 +23,7 @@ trial trial_new(double gravity, double dt, double duration)
 
 void trial_free(trial *t)
 {
-    for (int k = 0; k < t->s.n_bodies; k++) free(t->s.polygons[k].corners);
-    free(t->s.polygons);
-    free(t->s.bodies);
+    free_scene(&t->s);
 }
 
 static int add(trial *t, scene_body b)
@@ -114,9 +112,7 @@ void trial_weigh(trial *t, int body, double times)
 
 void trial_pin(trial *t, int a, int b, double x, double y)
 {
-    const scene_pin p = {a, b, x, y};
-    if (t->s.n_pins == MAX_PINS) abort();
-    t->s.pins[t->s.n_pins++] = p;
+    add_pin(&t->s, a, b, x, y);
 }
 
 carom_joint_def *trial_joint(trial *t, carom_joint_kind kind, int a, int b, double x, double y)

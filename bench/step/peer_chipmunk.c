@@ -11,7 +11,7 @@ typedef struct world {
     int n_bodies, n_shapes, n_joints;
     cpBody **bodies;
     cpShape **shapes;
-    cpConstraint *joints[MAX_PINS];
+    cpConstraint **joints;
 } world;
 
 static cpBody *new_body(const scene_body *b)
@@ -59,7 +59,8 @@ static void *create_with(const scene *s, int iterations)
     self->dt = s->dt;
     self->bodies = calloc((size_t)s->n_bodies, sizeof *self->bodies);
     self->shapes = calloc((size_t)s->n_bodies, sizeof *self->shapes);
-    if (!self->bodies || !self->shapes) abort();
+    self->joints = calloc((size_t)s->n_pins + 1, sizeof *self->joints);
+    if (!self->bodies || !self->shapes || !self->joints) abort();
     cpSpaceSetGravity(self->space, cpv(0, -s->gravity));
     for (int k = 0; k < s->n_bodies; k++) add_body(self, s, k);
     for (int k = 0; k < s->n_pins; k++) {
@@ -114,6 +115,7 @@ static void destroy(void *self)
     cpSpaceFree(s->space);
     free(s->shapes);
     free(s->bodies);
+    free(s->joints);
     free(s);
 }
 

@@ -31,15 +31,15 @@ typedef struct scene_polygon {
     double (*corners)[2];
 } scene_polygon;
 
-enum { MAX_PINS = 4096, MAX_CORNERS = 64 };
+enum { MAX_CORNERS = 64 };
 
 typedef struct scene {
     const char *name;
     int n_bodies, max_bodies;
     scene_body *bodies;
     scene_polygon *polygons; /* one per body, read of SHAPE_POLYGON; NULL: there is none */
-    int n_pins;
-    scene_pin pins[MAX_PINS];
+    int n_pins, max_pins;
+    scene_pin *pins;
     double gravity, dt;
     int rests;   /* 1: nothing should move */
     int warm_up; /* steps before the clock runs */
@@ -49,13 +49,15 @@ typedef struct scene {
 enum { N_SCENES = 12 };
 /* Scene k, 0 <= k < N_SCENES; memory exhausted ends the program. */
 scene make_scene(int k);
+void add_pin(scene *s, int a, int b, double x, double y);
 void free_scene(scene *s);
 
-/* Scenes that grow: free bodies, chain, stack, pyramid, pile, islands (stacks of four apart from
- * each other), hub (arms pinned to one heavy disc). */
-enum { N_FAMILIES = 7 };
+/* Scenes that grow: free bodies, chain, stack and pyramid that bear a pendulum, pile, islands
+ * (stacks of three, each with its pendulum), rest (stacks of four), hub (arms pinned to one heavy
+ * disc). */
+enum { N_FAMILIES = 8 };
 extern const char *const FAMILY_NAMES[N_FAMILIES];
-/* Family k of about n bodies; n_bodies is 0 where it cannot be so large. */
+/* Family k of about n bodies. */
 scene make_family(int k, int n);
 
 /* What a step was, where the contender says so. */

@@ -49,12 +49,6 @@ static scene_body anchor(void)
     return b;
 }
 
-static void pin(scene *s, int a, int b, double x, double y)
-{
-    const scene_pin p = {a, b, x, y};
-    s->pins[s->n_pins++] = p;
-}
-
 static scene empty(const char *name, int rests, int warm_up, int n_steps)
 {
     scene s;
@@ -102,7 +96,7 @@ static scene chain(const char *name, int n)
     int last = add(&s, anchor());
     for (int k = 0; k < n; k++) {
         const int link = add(&s, box(k + 0.5, 0, 0.5, 0.05));
-        pin(&s, last, link, k, 0);
+        add_pin(&s, last, link, k, 0);
         last = link;
     }
     return s;
@@ -128,15 +122,21 @@ static scene pyramid(const char *name, int base, int n_steps)
     return s;
 }
 
-/* The same, whose top box bears a pendulum: what stands is pressed anew in every step. */
-static scene loaded_pyramid(const char *name, int base, int n_steps)
+/* A pendulum swings at the center of a box: what bears it is pressed anew in every step. */
+static void hang_pendulum(scene *s, int from)
 {
-    scene s = pyramid(name, base, n_steps);
-    const int top = s.n_bodies - 1;
-    scene_body bob = box(0.3, base - 0.9, 0.1, 0.1);
+    const double *q = s->bodies[from].q;
+    scene_body bob = box(q[1] + 0.3, q[2] - 0.4, 0.1, 0.1);
     bob.shape = SHAPE_NONE;
-    pin(&s, top, add(&s, bob), 0, base - 0.5);
-    s.rests = 0;
+    const double x = q[1];
+    const double y = q[2];
+    add_pin(s, from, add(s, bob), x, y);
+    s->rests = 0;
+}
+
+static scene loaded(scene s)
+{
+    hang_pendulum(&s, s.n_bodies - 1);
     return s;
 }
 
@@ -186,17 +186,22 @@ scene make_scene(int k)
     case 8: return pyramid("pyramid 100 at rest", 100, 10);
     case 9: return pile("pile of 1000 discs settling", 1000);
     case 10: return many_free("1e5 free bodies", 100000);
-    default: return loaded_pyramid("pyramid 20 under a pendulum", 20, 60);
+    default: return loaded(pyramid("pyramid 20 under a pendulum", 20, 60));
     }
 }
 
-static scene islands(int n)
+/* Stacks of so many boxes, 3 m apart; with or without a pendulum at each. */
+static scene stacks(const char *name, int n, int height, int swings)
 {
-    scene s = empty("islands", 1, 60, 240);
-    const int columns = n / 4 > 1 ? n / 4 : 1;
+    scene s = empty(name, !swings, 60, 240);
+    const int size = height + swings;
+    const int columns = n / size > 1 ? n / size : 1;
     add(&s, slab(1.5 * columns, -1, 1.5 * columns + 20, 1, 0));
     for (int c = 0; c < columns; c++) {
-        for (int k = 0; k < 4 && c * 4 + k < n; k++) add(&s, box(3 * c, k + 0.5, 0.5, 0.5));
+        for (int k = 0; k < height && c * size + k < n; k++) {
+            add(&s, box(3 * c, k + 0.5, 0.5, 0.5));
+        }
+        if (swings) hang_pendulum(&s, s.n_bodies - 1);
     }
     return s;
 }
@@ -205,7 +210,6 @@ static scene islands(int n)
 static scene hub(int n)
 {
     scene s = empty("hub", 0, 0, 240);
-    if (n > MAX_PINS) return s;
     const double radius = 1 + 0.05 * n;
     const int center = add(&s, disc(0, 0, radius, 0));
     s.gravity = 0;
@@ -215,31 +219,25 @@ static scene hub(int n)
         scene_body b = box((radius + 0.5) * cos(a), (radius + 0.5) * sin(a), 0.5, 0.02);
         b.q[0] = a;
         const int arm = add(&s, b);
-        pin(&s, center, arm, radius * cos(a), radius * sin(a));
+        add_pin(&s, center, arm, radius * cos(a), radius * sin(a));
     }
     return s;
 }
 
 const char *const FAMILY_NAMES[N_FAMILIES] = {"free", "chain",   "stack", "pyramid",
-                                              "pile", "islands", "hub"};
+                                              "pile", "islands", "rest",  "hub"};
 
 scene make_family(int k, int n)
 {
-    const scene none = empty(FAMILY_NAMES[k], 0, 0, 0);
     const int base = (int)(0.5 * (sqrt(8.0 * n + 1) - 1) + 0.5);
     switch (k) {
     case 0: return many_free("free", n);
-    case 1: return n > MAX_PINS ? none : chain("chain", n);
-    case 2: return stack("stack", n);
-    case 3: return pyramid("pyramid", base, 60);
+    case 1: return chain("chain", n);
+    case 2: return loaded(stack("stack", n));
+    case 3: return loaded(pyramid("pyramid", base, 60));
     case 4: return pile("pile", n);
-    case 5: return islands(n);
+    case 5: return stacks("islands", n, 3, 1);
+    case 6: return stacks("rest", n, 4, 0);
     default: return hub(n);
     }
-}
-
-void free_scene(scene *s)
-{
-    free(s->bodies);
-    s->bodies = NULL;
 }

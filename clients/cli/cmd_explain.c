@@ -108,8 +108,10 @@ static void explain_needs(FILE *f, const carom_world_size *z, const carom_step_s
     snprintf(note, sizeof note, "3 per moving body; with multipliers %d rows",
              z->n_unknowns + z->n_joint_rows + z->n_contacts + z->n_friction);
     row(f, "velocities", z->n_unknowns, note);
-    if (z->factor_nonzeros > 0) {
-        row(f, "factor", z->factor_nonzeros, "nonzeros of the last factorization, fill included");
+    if (z->factor.nonzeros > 0) {
+        snprintf(note, sizeof note, "nonzeros of the islands' factors with fill; %.3g flops",
+                 z->factor.flops);
+        row(f, "factor", z->factor.nonzeros, note);
     }
     snprintf(note, sizeof note, "bytes held; at most %zu", z->bytes_high);
     row(f, "memory", (double)z->bytes, note);

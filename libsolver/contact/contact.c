@@ -51,6 +51,20 @@ void carom_contact_memory(const carom_contact_solver *solver, size_t *bytes, lon
     *calls = solver->memory.n_calls;
 }
 
+carom_factor_size carom_contact_factor_size(const carom_contact_solver *solver)
+{
+    carom_factor_size z = {0, 0};
+    if (!solver || !solver->pattern_valid) return z;
+    const crm_block_pattern *s = &solver->pattern;
+    for (int j = 0; j < s->n; j++) {
+        const double c = s->lp[j + 1] - s->lp[j];
+        z.nonzeros += 9 * (2 * c + 1);
+        /* The diagonal, both panels, and c^2 products of blocks for the columns behind. */
+        z.flops += 16 + 45 * c + 54 * c * c;
+    }
+    return z;
+}
+
 carom_status crm_solver_prepare(carom_contact_solver *c, const carom_contact_problem *p)
 {
     crm_memory *m = &c->memory;

@@ -130,12 +130,6 @@ static inline void crm_add(double *z, const double *row, int a, int b, double l)
     for (int i = 0; b >= 0 && i < 3; i++) z[3 * b + i] += row[3 + i] * l;
 }
 
-/* Blocks of the factors. */
-static inline int crm_island_blocks(const crm_island *s)
-{
-    return 2 * (s->lu.lp[s->lu.n] - s->lu.lp[0]) + s->lu.n;
-}
-
 void crm_vec_copy(const crm_island *s, crm_vec to, crm_vec from);
 void crm_vec_zero(const crm_island *s, crm_vec x);
 /* x += a y. */

@@ -94,7 +94,6 @@ static void solve_island(job *j, int island)
     o->factorizations = s->factorizations;
     o->iterations = s->iterations;
     o->pivots = s->pivots;
-    o->blocks = s->factorizations ? crm_island_blocks(s) : 0;
     o->degenerate = o->status == CAROM_E_INFEASIBLE ? 0 : count_degenerate(s);
 }
 
@@ -149,7 +148,6 @@ static void add_outcome(const crm_outcome *o, carom_contact_stats *stats)
     stats->factorizations += o->factorizations;
     stats->iterations += o->iterations;
     stats->pivots += o->pivots;
-    stats->blocks += o->blocks;
     stats->degenerate += o->degenerate;
     stats->residual_unpolished = fmax(stats->residual_unpolished, o->unpolished);
     if (o->stage > stats->stage) stats->stage = o->stage;

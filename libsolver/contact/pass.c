@@ -114,9 +114,7 @@ carom_status carom_contact_pass(carom_contact_solver *solver, const carom_contac
         crm_island_factor(s, 1, s->compliance);
         crm_island_reduce(s, s->rhs, s->step);
         add_step(y, g, problem, s, i, x);
-        if (s->factorizations == before) continue;
-        own.factorizations++;
-        own.blocks += crm_island_blocks(s);
+        own.factorizations += s->factorizations - before;
     }
     if (stats) *stats = own;
     return CAROM_OK;

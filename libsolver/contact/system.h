@@ -12,7 +12,6 @@ typedef struct crm_outcome {
     int factorizations;
     int iterations;
     int pivots;
-    int blocks;
     int degenerate;
 } crm_outcome;
 

@@ -268,6 +268,8 @@ void crm_sleep_settle(carom_world *w);
 /* solvers.c: gives each island of the frame a solver of its own, when there are several. */
 carom_status crm_solvers_assign(carom_world *w);
 void crm_solvers_free(carom_world *w);
+/* Of the islands of the last step. */
+carom_factor_size crm_solvers_factor_size(const carom_world *w);
 /* Bytes of all solvers and allocations made for them, those given up left out. */
 void crm_solvers_memory(const carom_world *w, size_t *bytes, long *calls);
 /* Of the island under way. */

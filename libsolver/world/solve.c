@@ -41,7 +41,6 @@ static void add_stats(carom_world *w, const carom_contact_stats *c)
     s->residual = fmax(s->residual, c->residual);
     s->iterations += c->iterations;
     if (c->stage > s->stage) s->stage = c->stage;
-    if (c->blocks > 0) w->factor_blocks = c->blocks;
 }
 
 static void take_velocities(const carom_world *w, const double *v, double *to)
@@ -160,7 +159,6 @@ carom_status crm_pass(carom_world *w, const crm_substep *s, crm_solve *c, const 
     const carom_status e = carom_contact_pass(crm_solver(w), &p, &x, &stats);
     w->effort += stats.factorizations;
     w->stats->factorizations += stats.factorizations;
-    if (stats.blocks > 0) w->factor_blocks = stats.blocks;
     take_velocities(w, w->rows.v, c->v);
     return e;
 }

@@ -81,6 +81,22 @@ void crm_solvers_memory(const carom_world *w, size_t *bytes, long *calls)
     }
 }
 
+carom_factor_size crm_solvers_factor_size(const carom_world *w)
+{
+    const crm_islands *s = &w->islands;
+    carom_factor_size sum = {0};
+    int shared = 0;
+    for (int k = 0; k < s->n; k++) {
+        const crm_island *i = &s->list[k];
+        if (!has_problem(i) || (!i->solver && shared)) continue;
+        shared |= !i->solver;
+        const carom_factor_size z = carom_contact_factor_size(i->solver ? i->solver : w->solver);
+        sum.nonzeros += z.nonzeros;
+        sum.flops += z.flops;
+    }
+    return sum;
+}
+
 void crm_solvers_free(carom_world *w)
 {
     crm_kept_solvers *t = &w->kept;

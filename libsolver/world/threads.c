@@ -17,7 +17,6 @@ typedef struct outcome {
     int first_touch, n_touches; /* in its lists */
     int first_event, n_events;
     int n_substeps;
-    int factor_blocks;
     carom_step_stats stats;
 } outcome;
 
@@ -117,12 +116,10 @@ static void advance_one(const job *j, carom_world *x, int island)
     o->first_touch = x->next.n;
     o->first_event = x->events.n;
     x->stats = &o->stats;
-    x->factor_blocks = 0;
     o->status = j->advance(x, &j->w->islands.list[island]);
     o->n_touches = x->next.n - o->first_touch;
     o->n_events = x->events.n - o->first_event;
     o->n_substeps = x->n_substeps;
-    o->factor_blocks = x->factor_blocks;
 }
 
 /* Takes islands until none is left. */
@@ -158,7 +155,6 @@ static carom_status collect(carom_world *w, const outcome *o, int n)
         w->n_substeps = o->n_substeps;
         if (o->status < 0) return o->status;
         crm_stats_add(w->stats, &o->stats);
-        if (o->factor_blocks) w->factor_blocks = o->factor_blocks;
         carom_status e = take_touches(w, o);
         if (!e && o->n_events) {
             e = crm_events_append(w, &o->by->events.list[o->first_event], o->n_events);

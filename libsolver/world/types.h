@@ -368,7 +368,6 @@ struct carom_world {
     int first_touch;        /* of the island, in next */
     double *joint_force[2]; /* per joint row: as crm_touch.force_n [N] */
     double *joint_total;    /* per joint row: over the last sub-step that took time [N] */
-    int factor_blocks;      /* 3 x 3, of the last contact problem that was factored */
     long revision;          /* counts changes of parameters */
     long n_steps;
     carom_step_stats *stats; /* of the step under way */

@@ -264,7 +264,7 @@ carom_world_size carom_world_measure(const carom_world *world)
         z.n_friction += crm_combine(w->settings.combine_friction, w->friction[c->body_a],
                                     w->friction[c->body_b]) > 0;
     }
-    z.factor_nonzeros = 9 * w->factor_blocks;
+    z.factor = crm_solvers_factor_size(w);
     crm_solvers_memory(w, &solver_bytes, &calls);
     carom_broadphase_memory(w->broadphase, &pair_bytes, &calls);
     z.bytes = w->memory.live + solver_bytes + pair_bytes;

@@ -95,7 +95,6 @@ typedef struct carom_contact_stats {
     int bodies;     /* with a free axis, touched by a contact or joint */
     int contacts;   /* with an impulse that some body feels */
     int joint_rows; /* likewise */
-    int blocks;     /* 3x3 blocks of the factors, 0 when nothing was factored */
 } carom_contact_stats;
 
 typedef struct carom_contact_solver carom_contact_solver;
@@ -107,6 +106,14 @@ CAROM_API carom_status carom_contact_create(const carom_contact_settings *settin
 CAROM_API void carom_contact_destroy(carom_contact_solver *solver);
 /* Bytes held and number of allocations made so far. */
 CAROM_API void carom_contact_memory(const carom_contact_solver *solver, size_t *bytes, long *calls);
+
+/* The factors that problems of the last one's graph need, one factorization of them: a block LU. */
+typedef struct carom_factor_size {
+    double nonzeros; /* of L, D and U in 3x3 blocks, fill included */
+    double flops;    /* additions and multiplications */
+} carom_factor_size;
+/* Zeros before the first problem, and without rows that some body feels. */
+CAROM_API carom_factor_size carom_contact_factor_size(const carom_contact_solver *solver);
 
 /* What carom_contact_solve may take from x as its first guess. */
 typedef enum carom_contact_guess {
@@ -145,7 +152,7 @@ CAROM_API carom_status carom_contact_start(carom_contact_solver *solver,
  * Rows that hold are then met to some 1e-10 of what they missed, also where they depend on each
  * other.  For Newton's method on what moves c: neither signs nor a residual are looked at, so end
  * with carom_contact_measure or a solve.  A back-substitution; a factorization where the solve
- * needed none: stats (may be NULL) has its factorizations and blocks, and zeros.  No check but for
+ * needed none: stats (may be NULL) has its factorizations, and zeros.  No check but for
  * CAROM_E_ARGUMENT before the first solve. */
 CAROM_API carom_status carom_contact_pass(carom_contact_solver *solver,
                                           const carom_contact_problem *problem,

@@ -320,11 +320,11 @@ typedef struct carom_world_size {
     int n_joints;
     int n_unknowns; /* 3 per moving body */
     int n_joint_rows;
-    int n_contacts;      /* last sub-step */
-    int n_friction;      /* ... of them with a tangential row */
-    int factor_nonzeros; /* of the last factorization */
-    size_t bytes;        /* held now */
-    size_t bytes_high;   /* high-water mark */
+    int n_contacts;           /* last sub-step */
+    int n_friction;           /* ... of them with a tangential row */
+    carom_factor_size factor; /* of the islands of the last step, one factorization of each */
+    size_t bytes;             /* held now */
+    size_t bytes_high;        /* high-water mark */
 } carom_world_size;
 CAROM_API carom_world_size carom_world_measure(const carom_world *world);
 
