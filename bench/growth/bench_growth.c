@@ -4,8 +4,8 @@
  * Usage: bench_growth [--quick] [family]: prints CSV: family, contender, bodies, contacts, seconds
  * per step (wall time: threads count), steps on the clock, factorizations per step, bytes held,
  * nonzeros and flops of one factorization, worst status.  A cell whose step is expected to take
- * longer than the budget is left out, and said on stderr.  Comments give the bandwidth of memory and
- * the rate of arithmetic. */
+ * longer than the budget is left out, and said on stderr.  Comments give the bandwidth of memory
+ * and the rate of arithmetic. */
 #include "bench/step/own.h"
 
 #include "carom/world.h"
@@ -74,10 +74,9 @@ static double cell(int family, int n, const contender *c, double budget)
     }
     carom_world_size z = {0};
     if (is_own(c)) z = carom_world_measure(self);
-    printf("%s,%s,%d,%d,%.3e,%d,%.3g,%zu,%.0f,%.0f,%d\n", FAMILY_NAMES[family], c->name,
-           s.n_bodies, count.n_contacts, spent / steps, steps,
-           (double)count.factorizations / steps, z.bytes, z.factor.nonzeros, z.factor.flops,
-           count.worst);
+    printf("%s,%s,%d,%d,%.3e,%d,%.3g,%zu,%.0f,%.0f,%d\n", FAMILY_NAMES[family], c->name, s.n_bodies,
+           count.n_contacts, spent / steps, steps, (double)count.factorizations / steps, z.bytes,
+           z.factor.nonzeros, z.factor.flops, count.worst);
     fflush(stdout);
     c->destroy(self);
     free_scene(&s);

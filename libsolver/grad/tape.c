@@ -67,16 +67,22 @@ static void pack(const crm_island *i, const crm_substep *s, crm_block *b, crm_re
     for (int k = 0; k < s->n_solves; k++) keep_solve(i, s, k, b, &to->s.solve[k]);
 }
 
+static carom_status reserve_record(carom_tape *t)
+{
+    void *records = t->records;
+    const carom_status e =
+        crm_reserve(&t->memory, &records, &t->max_records, t->n_records + 1, sizeof *t->records);
+    t->records = records;
+    return e;
+}
+
 static carom_status record_substep(void *user, const crm_substep *s)
 {
     carom_tape *t = user;
     const crm_island *island = t->source->island;
     if (s->n_contacts > t->most_contacts) t->most_contacts = s->n_contacts;
     if (t->source == t->world && !crm_records_kept(t)) return CAROM_OK;
-    void *records = t->records;
-    carom_status e =
-        crm_reserve(&t->memory, &records, &t->max_records, t->n_records + 1, sizeof *t->records);
-    t->records = records;
+    const carom_status e = reserve_record(t);
     if (e) return e;
     crm_record *r = &t->records[t->n_records];
     crm_block b = {NULL, 0};
@@ -92,6 +98,57 @@ static carom_status record_substep(void *user, const crm_substep *s)
     r->inner = s != &t->source->sub;
     t->n_records++;
     return CAROM_OK;
+}
+
+/* The first record of the last frame that is of the island, and starts where its bodies are; none:
+ * -1. */
+static int find_last(const carom_tape *t, const crm_island *i)
+{
+    const int end = t->frames[t->frame].first_record;
+    const int from = t->frame > 0 ? t->frames[t->frame - 1].first_record : end;
+    const size_t bytes = (size_t)i->n_bodies * sizeof *i->bodies;
+    for (int k = from; k < end; k++) {
+        const crm_record *r = &t->records[k];
+        if (r->island.n_bodies != i->n_bodies || memcmp(r->island.bodies, i->bodies, bytes)) {
+            continue;
+        }
+        for (int b = 0; b < i->n_bodies; b++) {
+            if (memcmp(&r->s.q0[3 * b], &t->source->q[3 * i->bodies[b]], 3 * sizeof(double)))
+                return -1;
+        }
+        return k;
+    }
+    return -1;
+}
+
+/* As of a record of the last frame, whose block it shares: the last records are dropped first. */
+static carom_status repeat_record(carom_tape *t, int k)
+{
+    const carom_status e = reserve_record(t);
+    if (e) return e;
+    crm_record *r = &t->records[t->n_records++];
+    *r = t->records[k];
+    r->block = NULL;
+    r->bytes = 0;
+    r->s.force = t->frames[t->frame].force;
+    r->s.time = carom_world_time(t->source);
+    r->which = (int)(t->source->island - t->source->islands.list);
+    return CAROM_OK;
+}
+
+static carom_status record_again(void *user, int *known)
+{
+    carom_tape *t = user;
+    carom_status e = CAROM_OK;
+    *known = 1;
+    if (t->source == t->world && !crm_records_kept(t)) return CAROM_OK;
+    const int first = find_last(t, t->source->island);
+    *known = first >= 0;
+    if (!*known) return CAROM_OK;
+    const int which = t->records[first].which;
+    const int end = t->frames[t->frame].first_record;
+    for (int k = first; !e && k < end && t->records[k].which == which; k++) e = repeat_record(t, k);
+    return e;
 }
 
 /* Drops records down to n. */
@@ -264,7 +321,7 @@ static int continues(const carom_tape *t)
 carom_status crm_record_step(carom_tape *t, int frame, const double *force, carom_step_stats *stats)
 {
     carom_world *w = t->source;
-    const crm_recorder recorder = {record_substep, restart_frame, t};
+    const crm_recorder recorder = {record_substep, record_again, restart_frame, t};
     t->frame = frame;
     t->frames[frame].first_record = t->n_records;
     w->recorder = recorder;

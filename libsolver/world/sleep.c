@@ -101,11 +101,17 @@ static carom_status keep_touches(carom_world *w)
     return CAROM_OK;
 }
 
-/* Free flight is run as it is; recorded steps are run. */
+/* Recorded steps know stillness alone. */
+static int may_sleep(const carom_world *w)
+{
+    return w->settings.sleep && !w->recorder.substep;
+}
+
+/* Free flight is run as it is. */
 static int may_rest(const carom_world *w)
 {
     const int held = w->island->n_pairs > 0 || w->island->n_joints > 0;
-    return w->rest && !w->recorder.substep && (held || w->settings.sleep);
+    return w->rest && (held || may_sleep(w));
 }
 
 /* Joint forces of the island before the step, for crm_sleep_settle. */
@@ -131,7 +137,7 @@ static void tell_again(carom_world *w)
     t->n_substeps = r->n_substeps;
     t->degenerate = r->degenerate;
     t->residual = r->residual;
-    *(w->settings.sleep ? &t->n_asleep : &t->n_still) += i->n_bodies;
+    *(may_sleep(w) ? &t->n_asleep : &t->n_still) += i->n_bodies;
 }
 
 carom_status crm_sleep_on(carom_world *w, int *asleep)
@@ -142,6 +148,11 @@ carom_status crm_sleep_on(carom_world *w, int *asleep)
     if (i->n_rows) save_forces(w);
     for (int k = 0; k < i->n_bodies; k++) {
         if (!sleeps(w, i->bodies[k])) return CAROM_OK;
+    }
+    if (w->recorder.again) {
+        int known;
+        const carom_status e = w->recorder.again(w->recorder.user, &known);
+        if (e || !known) return e;
     }
     *asleep = 1;
     tell_again(w);
@@ -319,7 +330,7 @@ static int is_still_island(const carom_world *w)
 void crm_sleep_settle(carom_world *w)
 {
     if (!may_rest(w)) return;
-    if (!w->settings.sleep) {
+    if (!may_sleep(w)) {
         mark(w, is_still_island(w));
         return;
     }

@@ -291,9 +291,11 @@ typedef struct crm_events {
     carom_contact_event *list;
 } crm_events;
 
-/* Told of every accepted sub-step, and when those of a frame are void. */
+/* Told of every accepted sub-step, of islands that would have those of the last frame again (*known
+ * = 0: they must be run, for nobody has these), and when those of a frame are void. */
 typedef struct crm_recorder {
     carom_status (*substep)(void *user, const crm_substep *s);
+    carom_status (*again)(void *user, int *known);
     void (*restart)(void *user);
     void *user;
 } crm_recorder;
