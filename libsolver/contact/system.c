@@ -347,6 +347,18 @@ static void share_rounding(const crm_island *s, int node, double floor, double *
     }
 }
 
+/* Some component is no rounding of its own terms, but one of its body's largest. */
+static int one_is_small(const crm_island *s)
+{
+    for (int i = 0; i < 3 * s->nb; i++) {
+        const double *size = &s->size[i - i % 3];
+        const double v = fabs(s->free[i] + s->best.z[i]);
+        const double most = fmax(size[0], fmax(size[1], size[2]));
+        if (v > CRM_ROUNDING * s->size[i] && v <= 2 * CRM_ROUNDING * most) return 1;
+    }
+    return 0;
+}
+
 /* Below what |v| is rounding of the terms of (4), where these are known. */
 static void find_rounding(const crm_island *s, double *rounding)
 {
@@ -355,7 +367,8 @@ static void find_rounding(const crm_island *s, double *rounding)
         rounding[i] = s->fresh ? CRM_ROUNDING * s->size[i] : 0;
         largest = fmax(largest, s->size[i]);
     }
-    for (int k = 0; s->fresh && k < s->nc; k++) {
+    if (!s->fresh || !one_is_small(s)) return;
+    for (int k = 0; k < s->nc; k++) {
         const crm_contact *c = &s->contact[k];
         if (s->best_mode[k] != CAROM_STICK || !(c->mu > 0) || !(s->best.n[k] > 0)) continue;
         share_rounding(s, c->a, CRM_TERM_FLOOR * largest, rounding);
