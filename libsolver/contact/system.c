@@ -347,27 +347,27 @@ static void share_rounding(const crm_island *s, int node, double floor, double *
     }
 }
 
-/* Some component is no rounding of its own terms, but one of its body's largest. */
-static int one_is_small(const crm_island *s)
+/* Some velocity is no rounding of its own terms, but may be of its body's largest. */
+static int one_is_small(const crm_island *s, const double *w)
 {
     for (int i = 0; i < 3 * s->nb; i++) {
         const double *size = &s->size[i - i % 3];
-        const double v = fabs(s->free[i] + s->best.z[i]);
+        const double v = fabs(s->free[i] + w[i]);
         const double most = fmax(size[0], fmax(size[1], size[2]));
-        if (v > CRM_ROUNDING * s->size[i] && v <= 2 * CRM_ROUNDING * most) return 1;
+        if (v > CRM_ROUNDING * s->size[i] && v <= CRM_ROUNDING * most) return 1;
     }
     return 0;
 }
 
 /* Below what |v| is rounding of the terms of (4), where these are known. */
-static void find_rounding(const crm_island *s, double *rounding)
+static void find_rounding(const crm_island *s, const double *w, double *rounding)
 {
     double largest = 0;
     for (int i = 0; i < 3 * s->nb; i++) {
         rounding[i] = s->fresh ? CRM_ROUNDING * s->size[i] : 0;
         largest = fmax(largest, s->size[i]);
     }
-    if (!s->fresh || !one_is_small(s)) return;
+    if (!s->fresh || !one_is_small(s, w)) return;
     for (int k = 0; k < s->nc; k++) {
         const crm_contact *c = &s->contact[k];
         if (s->best_mode[k] != CAROM_STICK || !(c->mu > 0) || !(s->best.n[k] > 0)) continue;
@@ -382,20 +382,18 @@ static void find_rounding(const crm_island *s, double *rounding)
 static void write_motion(const crm_system *y, const crm_graph *g, const carom_contact_problem *p,
                          const crm_island *s, int island, double *v)
 {
-    double *defect = s->rest.z;
+    double *w = s->rest.z;
     double *rounding = s->step.z;
-    crm_island_defect(s, s->best, defect);
-    find_rounding(s, rounding);
-    for (int b = 0; b < s->nb; b++) {
-        const int body = g->body_of[g->node_ptr[island] + b];
-        for (int i = 0; i < 3; i++) {
-            const int at = 3 * b + i;
-            const double d = defect[at];
-            const double w = s->best.z[at] + (fabs(d) <= CRM_ROUNDING ? d : 0);
-            const double root = y->root[3 * (g->node_ptr[island] + b) + i];
-            const int rests = root > 0 && fabs(s->free[at] + w) <= rounding[at];
-            v[3 * body + i] = rests ? 0 : p->u[3 * body + i] + y->speed[island] * root * w;
-        }
+    crm_island_defect(s, s->best, w);
+    for (int i = 0; i < 3 * s->nb; i++) {
+        w[i] = s->best.z[i] + (fabs(w[i]) <= CRM_ROUNDING ? w[i] : 0);
+    }
+    find_rounding(s, w, rounding);
+    for (int i = 0; i < 3 * s->nb; i++) {
+        const int at = 3 * g->body_of[g->node_ptr[island] + i / 3] + i % 3;
+        const double root = y->root[3 * g->node_ptr[island] + i];
+        const int rests = root > 0 && fabs(s->free[i] + w[i]) <= rounding[i];
+        v[at] = rests ? 0 : p->u[at] + y->speed[island] * root * w[i];
     }
 }
 

@@ -198,7 +198,7 @@ int crm_number_means(const carom_world *w, int array, size_t k)
     case LINEAR_DAMPING: return crm_is_damped(w, (int)k, 1);
     case ANGULAR_DAMPING: return crm_is_damped(w, (int)k, 0);
     case FORCE:
-    case FORCE_STEPS: return w->bodies[k % n / 3].type == CAROM_DYNAMIC;
+    case FORCE_STEPS: return w->bodies[k % n / 3].type != CAROM_STATIC;
     case V0: return w->bodies[k / 3].type != CAROM_STATIC;
     default: return array <= ANCHORS || joint_has(&w->joints[k], array);
     }

@@ -130,7 +130,7 @@ void crm_free_velocity_vjp(crm_reverse *r, const crm_substep *s, const crm_solve
     for (int i = 0; i < 3 * w->island->n_bodies; i++) {
         const int b = w->island->bodies[i / 3];
         const int at = 3 * b + i % 3;
-        const double W = w->rows.inv_mass[i];
+        const double W = crm_force_gain(w, i);
         const double u_bar = r->bars.u[i];
         const crm_decay d = crm_decay_in(w->bodies[b].damping[i % 3 > 0], w->damped ? h : 0);
         v_bar[at] += d.keep * u_bar;

@@ -120,8 +120,9 @@ double crm_border_acceleration(const carom_tape *t, int step, int k)
 {
     const carom_world *w = t->world;
     const int b = k / 3;
-    if (step == 0 || w->bodies[b].type != CAROM_DYNAMIC) return 0;
+    if (step == 0 || w->bodies[b].type == CAROM_STATIC) return 0;
     const double f = t->frames[step - 1].force[k];
+    if (w->bodies[b].type == CAROM_KINEMATIC) return f;
     const double m = k % 3 ? w->mass[b] : w->inertia[b];
     double a[3] = {0, 0, 0};
     const double *q = carom_tape_q(t, step);

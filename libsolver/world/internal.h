@@ -104,6 +104,9 @@ double crm_row_dot(const double row[6], const double *v, int body_a, int body_b)
 void crm_contact_rows(const crm_contact *c, double jn[6], double jt[6]);
 /* Rows of all contacts and joints at q into w->rows, joint errors, inverse masses; sub.moved. */
 void crm_rows_at(carom_world *w, crm_substep *s, const double *q);
+/* What number i of the island's velocity gains by a force on it, per time: W; of a kinematic body,
+ * whose force is an acceleration, 1. */
+double crm_force_gain(const carom_world *w, int i);
 /* W f + g - d v of a body at the forces of this step; v NULL: at rest. */
 void crm_free_acceleration(const carom_world *w, int body, const double *v, double a[3]);
 /* Gravity on number k = 0, 1, 2 of a body's velocity [m/s^2]. */

@@ -135,11 +135,18 @@ double crm_gravity(const carom_world *w, int body, int k)
     return b->type == CAROM_DYNAMIC && k > 0 ? b->gravity_scale * w->settings.gravity[k - 1] : 0;
 }
 
+double crm_force_gain(const carom_world *w, int i)
+{
+    const int kinematic = w->bodies[w->island->bodies[i / 3]].type == CAROM_KINEMATIC;
+    return kinematic ? 1 : w->rows.inv_mass[i];
+}
+
 void crm_free_acceleration(const carom_world *w, int body, const double *v, double a[3])
 {
     const double *f = &w->step_force[3 * body];
-    a[0] = a[1] = a[2] = 0;
-    if (w->bodies[body].type != CAROM_DYNAMIC) return;
+    const carom_body_type type = w->bodies[body].type;
+    for (int k = 0; k < 3; k++) a[k] = type == CAROM_KINEMATIC ? f[k] : 0;
+    if (type != CAROM_DYNAMIC) return;
     for (int k = 0; k < 3; k++) {
         const double m = k ? w->mass[body] : w->inertia[body];
         a[k] = f[k] / m + crm_gravity(w, body, k);
@@ -154,7 +161,7 @@ static void free_velocity(carom_world *w, const crm_substep *s, const double *v,
     for (int i = 0; i < w->island->n_bodies; i++) {
         const int b = w->island->bodies[i];
         for (int k = 0; k < 3; k++) {
-            const double push = w->rows.inv_mass[3 * i + k] * s->force[3 * b + k];
+            const double push = crm_force_gain(w, 3 * i + k) * s->force[3 * b + k];
             const double g = crm_gravity(w, b, k);
             double *u = &w->rows.u[3 * i + k];
             *u = v[3 * b + k] + h * (push + g);

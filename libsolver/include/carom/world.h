@@ -15,7 +15,8 @@ extern "C" {
 typedef enum carom_body_type {
     CAROM_DYNAMIC,
     CAROM_STATIC,   /* never moves; its velocity must be zero */
-    CAROM_KINEMATIC /* moves with its given velocity whatever touches it */
+    CAROM_KINEMATIC /* moves with its given velocity whatever touches it, and is accelerated by what
+                     * stands where others have forces */
 } carom_body_type;
 
 typedef enum carom_integrator {
@@ -87,7 +88,8 @@ typedef struct carom_body_def {
     const carom_shape *shapes; /* copied; vertices relative to the position = center of mass */
     carom_pose pose;
     double velocity[3]; /* (omega, vx, vy) [rad/s, m/s, m/s] */
-    double force[3];    /* constant (torque, fx, fy) [N m, N, N] */
+    double force[3];    /* constant (torque, fx, fy) [N m, N, N]; of a kinematic body its
+                         * acceleration [rad/s^2, m/s^2, m/s^2] */
     double mass;        /* [kg], > 0 when dynamic */
     double inertia;     /* about the center of mass [kg m^2], > 0 when dynamic; INFINITY locks the
                          * rotation: omega stays what it is, whatever happens */
@@ -239,7 +241,8 @@ typedef struct carom_step_stats {
 } carom_step_stats;
 
 /* Advances by dt.  force: (torque, fx, fy) per body for this step, added to the constant forces;
- * NULL: none.  stats may be NULL.  On a negative status the world is as it was. */
+ * NULL: none.  For a kinematic body it is an acceleration: (w - v) / dt leads it to the velocity w
+ * at the end of the step, by the mean of both velocities on the way (euler: by w).  stats may be NULL.  On a negative status the world is as it was. */
 CAROM_API carom_status carom_world_step(carom_world *world, const double *force,
                                         carom_step_stats *stats);
 
