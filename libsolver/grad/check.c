@@ -289,6 +289,7 @@ static carom_status probe(const checker *c, int array, size_t k, double by, doub
         double *x = array < 0 ? NULL : crm_number(w, array, k);
         memset(w->force, 0, 3 * (size_t)w->n_bodies * sizeof(double));
         if (x) *x += by;
+        w->n_steps = t->first_step;
         e = carom_tape_create(w, NULL, &run);
     }
     if (e >= 0 && run_all(c, run, k, array == FORCE_STEPS ? by : 0) >= 0) {

@@ -58,10 +58,12 @@ static carom_status column_vjp(crm_reverse *r, int n, int last, double *h_bar)
 {
     for (int k = last; k > last - n; k--) {
         double inner_bar;
+        const double before = r->time_bar;
         crm_unpack(r->world, &r->tape->records[k], r->moved, &r->inner);
         const carom_status e = crm_smooth_vjp(r, &r->inner.s, r->column_q, r->column_v, &inner_bar);
         if (e < 0) return e;
-        *h_bar += inner_bar / n;
+        /* It starts after so many of the column's n. */
+        *h_bar += (inner_bar + (k - (last - n + 1)) * (r->time_bar - before)) / n;
     }
     return CAROM_OK;
 }
@@ -139,9 +141,11 @@ static carom_status column_jvp(crm_forward *f, int n, int first, double weight, 
     for (int k = first; e >= 0 && k < first + n; k++) {
         crm_unpack(f->world, &f->tape->records[k], f->moved, &f->inner);
         e = crm_smooth_jvp(f, &f->inner.s, n_lines);
+        for (int i = 0; i < n_lines; i++) f->lines[i].time += f->lines[i].h;
     }
     for (int i = 0; i < n_lines; i++) {
         crm_line *line = &f->lines[i];
+        line->time -= n * line->h;
         add(w, line->sum_q, line->q, weight);
         add(w, line->sum_v, line->v, weight);
         line->h *= n;

@@ -17,6 +17,17 @@ static void add_transposed(const double A[9], const double g[3], double *to)
     for (int j = 0; j < 3; j++) to[j] += A[j] * g[0] + A[3 + j] * g[1] + A[6 + j] * g[2];
 }
 
+/* <d f / dt, g> of body b to the time of the sub-step's start, and to h where it acts at its end. */
+static void rate_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, int b,
+                     const double g[3], double *h_bar)
+{
+    double rate[3];
+    crm_field_rate(r->world, b, crm_field_time(s, c), c->q, crm_field_velocity(s, c), rate);
+    const double t_bar = rate[0] * g[0] + rate[1] * g[1] + rate[2] * g[2];
+    r->time_bar += t_bar;
+    if (crm_field_is_late(s, c)) *h_bar += t_bar;
+}
+
 void crm_fields_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, double *v_bar,
                     double *q_bar, double *h_bar)
 {
@@ -34,6 +45,7 @@ void crm_fields_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, do
         push_bar(r, s, c, i, g);
         add_transposed(A, g, q_bar + 3 * b);
         add_transposed(B, g, seen_bar + 3 * b);
+        rate_vjp(r, s, c, b, g, h_bar);
         for (int k = 3 * i; k < 3 * i + 3; k++) {
             r->bars.inv_mass[k] += share * s->h * f[k % 3] * r->bars.u[k];
             *h_bar += share * w->rows.inv_mass[k] * f[k % 3] * r->bars.u[k];
@@ -67,15 +79,17 @@ void crm_fields_jvp(crm_forward *f, const crm_substep *s, const crm_solve *c, co
     const double *v = crm_field_velocity(s, c);
     const double share = crm_share(c);
     const int late = c->kind == CRM_STAGE_2;
+    const double t_dot = line->time + (crm_field_is_late(s, c) ? line->h : 0);
     for (int i = 0; i < w->island->n_bodies; i++) {
         const int b = w->island->bodies[i];
-        double force[3], A[9], B[9];
+        double force[3], rate[3], A[9], B[9];
         if (w->bodies[b].type != CAROM_DYNAMIC) continue;
         crm_field_force(w, b, t, c->q, v, force);
         crm_field_slopes(w, b, t, c->q, v, A, B);
+        crm_field_rate(w, b, t, c->q, v, rate);
         for (int k = 0; k < 3; k++) {
             const double W = w->rows.inv_mass[3 * i + k];
-            double dot = row_times(A, k, line->q + 3 * b);
+            double dot = row_times(A, k, line->q + 3 * b) + rate[k] * t_dot;
             if (!late) dot += row_times(B, k, line->v0 + 3 * b);
             f->dot.u[3 * i + k] +=
                 share *

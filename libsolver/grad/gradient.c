@@ -155,6 +155,14 @@ static carom_status locate_vjp(crm_reverse *r, crm_substep *s, double left_bar, 
     return CAROM_OK;
 }
 
+/* A sub-step of frame n starts at (n + 1) dt less what is left then. */
+static void give_time(crm_reverse *r, double *left_bar)
+{
+    const double n = (double)(r->tape->first_step + r->frame);
+    *left_bar -= r->time_bar;
+    if (r->sink.g.dt) *r->sink.g.dt += (n + 1) * r->time_bar;
+}
+
 /* One sub-step backward; *left_bar is the cotangent of the time left after it, then before it. */
 static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
 {
@@ -169,6 +177,7 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
         const carom_status e = locate_vjp(r, s, *left_bar, &k);
         if (e < 0) return e;
     }
+    r->time_bar = 0;
     const carom_status e = crm_substep_vjp(r, s, r->q_bar, r->v_bar, &h_bar);
     if (e < 0) return e;
     event_start_vjp(r, s, k);
@@ -183,6 +192,7 @@ static carom_status reverse_record(crm_reverse *r, int record, double *left_bar)
     case CRM_END_EVENT:
     case CRM_END_STOP: break; /* left_before = left_after + h*, and h* is in k */
     }
+    give_time(r, left_bar);
     return CAROM_OK;
 }
 

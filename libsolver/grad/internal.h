@@ -41,6 +41,7 @@ struct carom_tape {
     crm_record *records;
     int n_frames, max_frames;
     crm_frame *frames;
+    long first_step;       /* of the world: its steps before the recording */
     double *q_end, *v_end; /* 3 n_bodies: state after the last recorded step */
     double *rest_force;    /* 3 n_bodies: of steps that were given none, where memory is bounded */
     int n_bodies;
@@ -162,6 +163,7 @@ typedef struct crm_line {
     const carom_gradient *by;  /* parameters, read only */
     double h;                  /* of the length of the sub-step */
     double left;               /* of the time left to the island */
+    double time;               /* of the start of the sub-step, for forces that depend on it */
     double *q, *v;             /* 3 n_bodies, like all below: of the state under way */
     double *q0, *v0;           /* ... and of the start of the sub-step */
     double *start_q, *start_v; /* of an extrapolated one, whose columns use the others */
@@ -211,6 +213,7 @@ typedef struct crm_reverse {
     crm_sink sink;
     int from, to;                    /* frames from .. to - 1 */
     double scale;                    /* largest seed so far */
+    double time_bar;                 /* of the start of the sub-step under way */
     crm_forward clockwork;           /* without lines of its own; opened by the first event */
     double *q_bar, *v_bar;           /* 3 n_bodies: state under way */
     double *velocity_bar;            /* 3 per body of the island */

@@ -126,7 +126,8 @@ double crm_border_acceleration(const carom_tape *t, int step, int k)
     const double m = k % 3 ? w->mass[b] : w->inertia[b];
     double a[3] = {0, 0, 0};
     const double *q = carom_tape_q(t, step);
-    if (w->n_fields) crm_field_acceleration(w, b, 0, q, carom_tape_v(t, step), a);
+    const double time = (double)(t->first_step + step) * w->settings.dt;
+    if (w->n_fields) crm_field_acceleration(w, b, time, q, carom_tape_v(t, step), a);
     return a[k % 3] + f / m + crm_gravity(w, b, k % 3) -
            w->bodies[b].damping[k % 3 > 0] * carom_tape_v(t, step)[k];
 }

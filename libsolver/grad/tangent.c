@@ -91,6 +91,7 @@ crm_line *crm_begin_clockwork(const crm_forward *f)
     memset(clock->v, 0, bytes);
     clock->by = &none;
     clock->h = 1;
+    clock->time = 0;
     return clock;
 }
 
@@ -142,12 +143,23 @@ void crm_end_of(const crm_forward *f, int record, int end, crm_substep *s)
     crm_copy(f->world, s->v1, carom_tape_v(t, f->frame + 1));
 }
 
+/* A sub-step of frame n starts at (n + 1) dt less what is left then. */
+static void start_time(const crm_forward *f)
+{
+    const double n = (double)(f->tape->first_step + f->frame);
+    for (int i = 0; i < f->n; i++) {
+        crm_line *line = &f->lines[i];
+        line->time = (n + 1) * crm_entry(line->by->dt, 0) - line->left;
+    }
+}
+
 static carom_status forward_record(crm_forward *f, int record, int end)
 {
     crm_substep *s = &f->work.s;
     f->record = record;
     crm_unpack(f->world, &f->tape->records[record], f->moved, &f->work);
     crm_end_of(f, record, end, s);
+    start_time(f);
     if (s->end == CRM_END_EVENT || s->end == CRM_END_STOP) return locate_jvp(f, s);
     share_time(f, s);
     return crm_substep_jvp(f, s, f->n);

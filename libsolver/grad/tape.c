@@ -235,6 +235,7 @@ void carom_tape_rewind(carom_tape *tape)
     for (int k = 0; tape->limit && k < tape->n_frames; k++) drop_frame(tape, k);
     tape->n_frames = 0;
     tape->revision = tape->world->revision;
+    tape->first_step = tape->world->n_steps;
     crm_forget_clocks(tape->world);
     keep_end(tape);
 }

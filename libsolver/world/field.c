@@ -45,6 +45,19 @@ void crm_field_slopes(const carom_world *w, int body, double t, const double *q,
     }
 }
 
+void crm_field_rate(const carom_world *w, int body, double t, const double *q, const double *v,
+                    double by_t[3])
+{
+    by_t[0] = by_t[1] = by_t[2] = 0;
+    for (int k = 0; k < w->n_fields; k++) {
+        const carom_field *x = &w->fields[k];
+        double one[3] = {0, 0, 0};
+        if (!x->rate) continue;
+        x->rate(x->user, body, t, q + 3 * body, v + 3 * body, one);
+        for (int i = 0; i < 3; i++) by_t[i] += one[i];
+    }
+}
+
 int crm_fields_have_slopes(const carom_world *w)
 {
     for (int k = 0; k < w->n_fields; k++) {
@@ -53,10 +66,14 @@ int crm_fields_have_slopes(const carom_world *w)
     return 1;
 }
 
+int crm_field_is_late(const crm_substep *s, const crm_solve *c)
+{
+    return c->q != s->q0 && c->kind != CRM_VELOCITY && c->kind != CRM_STAGE_1;
+}
+
 double crm_field_time(const crm_substep *s, const crm_solve *c)
 {
-    return c->q == s->q0 || c->kind == CRM_VELOCITY || c->kind == CRM_STAGE_1 ? s->time
-                                                                              : s->time + s->h;
+    return crm_field_is_late(s, c) ? s->time + s->h : s->time;
 }
 
 const double *crm_field_velocity(const crm_substep *s, const crm_solve *c)

@@ -430,8 +430,11 @@ void crm_field_force(const carom_world *w, int body, double t, const double *q, 
                      double f[3]);
 void crm_field_slopes(const carom_world *w, int body, double t, const double *q, const double *v,
                       double by_q[9], double by_v[9]);
+void crm_field_rate(const carom_world *w, int body, double t, const double *q, const double *v,
+                    double by_t[3]);
 int crm_fields_have_slopes(const carom_world *w);
 /* Time and velocities at which a solve takes them. */
+int crm_field_is_late(const crm_substep *s, const crm_solve *c);
 double crm_field_time(const crm_substep *s, const crm_solve *c);
 const double *crm_field_velocity(const crm_substep *s, const crm_solve *c);
 /* Their impulses to rows.u. */

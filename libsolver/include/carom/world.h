@@ -207,10 +207,13 @@ typedef struct carom_field {
     void (*force)(void *user, int body, double t, const double q[3], const double v[3],
                   double f[3]);
     /* by_q[3 i + j] = d f_i / d q_j, by_v likewise; zero before the call.  NULL: gradients and
-     * tangents of runs with it are refused.  Only for forces that do not depend on t. */
+     * tangents of runs with it are refused. */
     void (*derivative)(void *user, int body, double t, const double q[3], const double v[3],
                        double by_q[9], double by_v[9]);
     void *user; /* the caller's; must outlive the world and its copies */
+    /* by_t[i] = d f_i / d t; zero before the call.  NULL: the force does not depend on t. */
+    void (*rate)(void *user, int body, double t, const double q[3], const double v[3],
+                 double by_t[3]);
 } carom_field;
 /* CAROM_E_ARGUMENT without force, CAROM_E_MEMORY, CAROM_E_STATE once sealed. */
 CAROM_API carom_status carom_world_add_field(carom_world *world, const carom_field *field);
