@@ -27,8 +27,26 @@ static int joined(const carom_world *w, int a, int b)
     return bsearch(&key, w->joined, (size_t)w->n_joined, sizeof key, compare_keys) != NULL;
 }
 
+/* In the room of the joined pairs, which are sorted in later. */
+static void count_twins(carom_world *w)
+{
+    long *keys = w->joined;
+    const int n = w->n_joints;
+    for (int k = 0; k < n; k++) keys[k] = body_key(w, w->joints[k].body_a, w->joints[k].body_b);
+    qsort(keys, (size_t)n, sizeof *keys, compare_keys);
+    for (int k = 0; k < n; k++) {
+        const long key = body_key(w, w->joints[k].body_a, w->joints[k].body_b);
+        const long *at = bsearch(&key, keys, (size_t)n, sizeof key, compare_keys);
+        const long *end = at;
+        while (at > keys && at[-1] == key) at--;
+        while (end < keys + n && *end == key) end++;
+        w->joints[k].n_twins = (int)(end - at);
+    }
+}
+
 void crm_sort_joined(carom_world *w)
 {
+    if (w->n_joints) count_twins(w);
     w->n_joined = 0;
     for (int k = 0; k < w->n_joints; k++) {
         const crm_joint *j = &w->joints[k];

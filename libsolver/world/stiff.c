@@ -48,7 +48,8 @@ static carom_vec2 force_of(const carom_world *w, const crm_joint *j, const crm_j
 }
 
 /* Joint j seen from body b, with its arm r, the force on it and what is at the other end.  A joint
- * that holds a point takes the other body along, by at least the mass that it has there. */
+ * that holds a point takes the other body along, by at least the mass that it has there; several
+ * joints of the same two bodies take along one. */
 static void add_side(const carom_world *w, const crm_joint *j, int b, carom_vec2 r,
                      carom_vec2 force, int other, carom_vec2 arm)
 {
@@ -59,7 +60,7 @@ static void add_side(const carom_world *w, const crm_joint *j, int b, carom_vec2
     const double give = inverse(w, w->mass, other) +
                         inverse(w, w->inertia, other) * (arm.x * arm.x + arm.y * arm.y);
     const double most = UNMOVED * w->mass[b];
-    const double m = give * most > 1 ? 1 / give : most;
+    const double m = (give * most > 1 ? 1 / give : most) / j->n_twins;
     x.zeroth[0] += m;
     x.first[0] += m * r.x;
     x.first[1] += m * r.y;

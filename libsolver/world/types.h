@@ -61,6 +61,7 @@ typedef struct crm_joint {
     double angle;       /* held turn of B against A [rad] */
     double length;      /* held distance [m] */
     double lever;       /* makes an angle a length: L [m]; set by seal */
+    int n_twins;        /* joints of the same two bodies, this one included; set by seal */
     double lower;       /* limits of what crm_limit_measure says [m, rad]; -HUGE_VAL: none */
     double upper;       /* HUGE_VAL: none */
     double restitution; /* at its limits */
