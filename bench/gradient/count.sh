@@ -11,7 +11,7 @@ count() {
     sed -n 's/^.*Collected : \([0-9]*\).*$/\1/p' "$out/log"
 }
 echo "scene,what,instructions per step,over forward"
-for scene in "0 stack of 10" "1 chain of 10" "3 pile of 40"; do
+for scene in "0 stack of 10 under a pendulum" "1 chain of 10" "3 pile of 40"; do
     k=${scene%% *}
     forward=$(count "$k" 0)
     for what in "0 forward" "1 recorded" "2 backward by q0" "3 backward by all" \

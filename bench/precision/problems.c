@@ -231,6 +231,7 @@ static problem tower(const char *name, int n, double ratio)
 static problem pyramid(const char *name, int base)
 {
     problem p = ground(name, base * (base + 1) / 2);
+    p.s.bodies[0].hx = fmax(p.s.bodies[0].hx, 0.5 * base + 10); /* all of it stands on the floor */
     for (int row = 0; row < base; row++) {
         for (int k = 0; k < base - row; k++) {
             box(&p.s, 0.45, 0.5, 0, k - 0.5 * (base - 1 - row), row + 0.5, 0.5);
