@@ -227,42 +227,21 @@ static void solvers_of_the_past_are_given_up(void **state)
     carom_world_destroy(w);
 }
 
-static int euler(void **state)
-{
-    (void)state;
-    scene_integrator = CAROM_EULER;
-    return 0;
-}
-
-static int located(void **state)
-{
-    (void)state;
-    scene_integrator = CAROM_LOCATED;
-    return 0;
-}
-
-static int fixed(void **state)
-{
-    (void)state;
-    scene_integrator = CAROM_FIXED;
-    return 0;
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(others_are_not_noticed, euler),
-        cmocka_unit_test_setup(others_are_not_noticed, located),
-        cmocka_unit_test_setup(others_are_not_noticed, fixed),
-        cmocka_unit_test_setup(gradients_are_apart, euler),
-        cmocka_unit_test_setup(gradients_are_apart, located),
-        cmocka_unit_test_setup(thrown_out_of_its_room, euler),
-        cmocka_unit_test_setup(thrown_out_of_its_room, located),
-        cmocka_unit_test_setup(free_flight_solves_nothing, located),
-        cmocka_unit_test_setup(an_impact_is_its_islands, located),
-        cmocka_unit_test_setup(factors_are_kept_by_island, located),
-        cmocka_unit_test_setup(factors_are_kept_by_island, fixed),
-        cmocka_unit_test_setup(solvers_of_the_past_are_given_up, located),
+        cmocka_unit_test_setup(others_are_not_noticed, scene_euler),
+        cmocka_unit_test_setup(others_are_not_noticed, scene_located),
+        cmocka_unit_test_setup(others_are_not_noticed, scene_fixed),
+        cmocka_unit_test_setup(gradients_are_apart, scene_euler),
+        cmocka_unit_test_setup(gradients_are_apart, scene_located),
+        cmocka_unit_test_setup(thrown_out_of_its_room, scene_euler),
+        cmocka_unit_test_setup(thrown_out_of_its_room, scene_located),
+        cmocka_unit_test_setup(free_flight_solves_nothing, scene_located),
+        cmocka_unit_test_setup(an_impact_is_its_islands, scene_located),
+        cmocka_unit_test_setup(factors_are_kept_by_island, scene_located),
+        cmocka_unit_test_setup(factors_are_kept_by_island, scene_fixed),
+        cmocka_unit_test_setup(solvers_of_the_past_are_given_up, scene_located),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -224,40 +224,19 @@ static void tapes_are_awake(void **state)
     carom_world_destroy(w[1]);
 }
 
-static int euler(void **state)
-{
-    (void)state;
-    scene_integrator = CAROM_EULER;
-    return 0;
-}
-
-static int located(void **state)
-{
-    (void)state;
-    scene_integrator = CAROM_LOCATED;
-    return 0;
-}
-
-static int fixed(void **state)
-{
-    (void)state;
-    scene_integrator = CAROM_FIXED;
-    return 0;
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(rest_is_not_run, euler),
-        cmocka_unit_test_setup(rest_is_not_run, located),
-        cmocka_unit_test_setup(rest_is_not_run, fixed),
-        cmocka_unit_test_setup(changes_wake, located),
-        cmocka_unit_test_setup(a_hit_wakes, located),
-        cmocka_unit_test_setup(a_hit_wakes, fixed),
-        cmocka_unit_test_setup(restored_asleep, euler),
-        cmocka_unit_test_setup(restored_asleep, located),
-        cmocka_unit_test_setup(what_moves_does_not_sleep, located),
-        cmocka_unit_test_setup(tapes_are_awake, located),
+        cmocka_unit_test_setup(rest_is_not_run, scene_euler),
+        cmocka_unit_test_setup(rest_is_not_run, scene_located),
+        cmocka_unit_test_setup(rest_is_not_run, scene_fixed),
+        cmocka_unit_test_setup(changes_wake, scene_located),
+        cmocka_unit_test_setup(a_hit_wakes, scene_located),
+        cmocka_unit_test_setup(a_hit_wakes, scene_fixed),
+        cmocka_unit_test_setup(restored_asleep, scene_euler),
+        cmocka_unit_test_setup(restored_asleep, scene_located),
+        cmocka_unit_test_setup(what_moves_does_not_sleep, scene_located),
+        cmocka_unit_test_setup(tapes_are_awake, scene_located),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

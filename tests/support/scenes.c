@@ -15,6 +15,37 @@ static void must(carom_world *w, carom_status e)
     if (e < 0) fail_msg("%s: %s", carom_status_name(e), carom_world_error(w));
 }
 
+static int worlds_with(carom_integrator integrator, int order)
+{
+    scene_integrator = integrator;
+    scene_order = order;
+    return 0;
+}
+
+int scene_euler(void **state)
+{
+    (void)state;
+    return worlds_with(CAROM_EULER, 2);
+}
+
+int scene_located(void **state)
+{
+    (void)state;
+    return worlds_with(CAROM_LOCATED, 2);
+}
+
+int scene_fixed(void **state)
+{
+    (void)state;
+    return worlds_with(CAROM_FIXED, 2);
+}
+
+int scene_order_4(void **state)
+{
+    (void)state;
+    return worlds_with(CAROM_LOCATED, 4);
+}
+
 carom_world *scene_world(double g, double dt)
 {
     carom_world_settings s = carom_world_defaults();

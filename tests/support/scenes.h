@@ -12,6 +12,11 @@ extern int scene_order;
 extern int scene_events;
 /* ... and their tolerance; 0 at the start. */
 extern double scene_tolerance;
+/* Set-ups of tests: worlds with that integrator from now on. */
+int scene_euler(void **state);
+int scene_located(void **state);
+int scene_fixed(void **state);
+int scene_order_4(void **state);
 /* Gravity (0, -g), step dt. */
 carom_world *scene_world(double g, double dt);
 /* Static box 40 x 2 whose top is y = 0; index of the body. */
