@@ -31,16 +31,21 @@ static int joined(const carom_world *w, int a, int b)
 static void count_twins(carom_world *w)
 {
     long *keys = w->joined;
-    const int n = w->n_joints;
-    for (int k = 0; k < n; k++) keys[k] = body_key(w, w->joints[k].body_a, w->joints[k].body_b);
+    int n = 0;
+    for (int k = 0; k < w->n_joints; k++) {
+        const crm_joint *j = &w->joints[k];
+        if (crm_joint_takes_along(j)) keys[n++] = body_key(w, j->body_a, j->body_b);
+    }
     qsort(keys, (size_t)n, sizeof *keys, compare_keys);
-    for (int k = 0; k < n; k++) {
-        const long key = body_key(w, w->joints[k].body_a, w->joints[k].body_b);
+    for (int k = 0; k < w->n_joints; k++) {
+        crm_joint *j = &w->joints[k];
+        if (!crm_joint_takes_along(j)) continue;
+        const long key = body_key(w, j->body_a, j->body_b);
         const long *at = bsearch(&key, keys, (size_t)n, sizeof key, compare_keys);
         const long *end = at;
         while (at > keys && at[-1] == key) at--;
         while (end < keys + n && *end == key) end++;
-        w->joints[k].n_twins = (int)(end - at);
+        j->n_twins = (int)(end - at);
     }
 }
 

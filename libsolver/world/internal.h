@@ -395,6 +395,8 @@ double crm_slip_speed(const crm_contact *c, const double *v);
 /* change.c: when a contact of an extrapolated sub-step opens or begins to slip, it ends there. */
 carom_status crm_locate_change(carom_world *w, double left);
 
+/* stiff.c: whether it holds a point of both bodies. */
+int crm_joint_takes_along(const crm_joint *j);
 /* stiff.c: how much of the time left a stable sub-step may take, by the forces of joints (look = 0:
  * those of the frame so far will do); says CAROM_LIMIT where more of
  * them were needed than are allowed. */

@@ -13,6 +13,11 @@ static const double EXTRAPOLATED = 1.5; /* as much */
 /* A mass that does not move [mass of the body beside it]. */
 static const double UNMOVED = 1e12;
 
+int crm_joint_takes_along(const crm_joint *j)
+{
+    return j->kind == CAROM_REVOLUTE || j->kind == CAROM_WELD;
+}
+
 static double inverse(const carom_world *w, const double *of, int body)
 {
     return w->bodies[body].type == CAROM_DYNAMIC ? 1 / of[body] : 0;
@@ -56,7 +61,7 @@ static void add_side(const carom_world *w, const crm_joint *j, int b, carom_vec2
     if (w->bodies[b].type != CAROM_DYNAMIC) return;
     const swing x = swing_of(w, b);
     x.zeroth[1] += force.x * r.x + force.y * r.y;
-    if (j->kind != CAROM_REVOLUTE && j->kind != CAROM_WELD) return;
+    if (!crm_joint_takes_along(j)) return;
     const double give = inverse(w, w->mass, other) +
                         inverse(w, w->inertia, other) * (arm.x * arm.x + arm.y * arm.y);
     const double most = UNMOVED * w->mass[b];

@@ -57,13 +57,13 @@ typedef struct crm_joint {
     int body_b;
     carom_vec2 local_a;
     carom_vec2 local_b;
-    double axis;        /* direction in the frame of A [rad] */
-    double angle;       /* held turn of B against A [rad] */
-    double length;      /* held distance [m] */
-    double lever;       /* makes an angle a length: L [m]; set by seal */
-    int n_twins;        /* joints of the same two bodies, this one included; set by seal */
-    double lower;       /* limits of what crm_limit_measure says [m, rad]; -HUGE_VAL: none */
-    double upper;       /* HUGE_VAL: none */
+    double axis;   /* direction in the frame of A [rad] */
+    double angle;  /* held turn of B against A [rad] */
+    double length; /* held distance [m] */
+    double lever;  /* makes an angle a length: L [m]; set by seal */
+    int n_twins;   /* joints that take these two bodies along, this one included; set by seal */
+    double lower;  /* limits of what crm_limit_measure says [m, rad]; -HUGE_VAL: none */
+    double upper;  /* HUGE_VAL: none */
     double restitution; /* at its limits */
     double stiffness;   /* spring on what crm_spring_measures says [N/m, N m/rad] */
     double damping;     /* [N s/m, N m s/rad] */
