@@ -17,7 +17,8 @@ static void add_transposed(const double A[9], const double g[3], double *to)
     for (int j = 0; j < 3; j++) to[j] += A[j] * g[0] + A[3 + j] * g[1] + A[6 + j] * g[2];
 }
 
-/* <d f / dt, g> of body b to the time of the sub-step's start, and to h where it acts at its end. */
+/* <d f / dt, g> of body b to the time of the sub-step's start, and to h where it acts at its end.
+ */
 static void rate_vjp(crm_reverse *r, const crm_substep *s, const crm_solve *c, int b,
                      const double g[3], double *h_bar)
 {

@@ -47,6 +47,7 @@ struct carom_tape {
     int n_bodies;
     int most_contacts;   /* of all sub-steps recorded */
     int frame;           /* under way */
+    int next_known;      /* record of the frame before it at which to look for the next island */
     carom_world *source; /* of the sub-steps under way: world, or replay */
     /* Checkpoints: only the frames held_from .. held_to - 1 have records; others are run again. */
     int held_from, held_to; /* -1: none */

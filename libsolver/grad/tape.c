@@ -106,8 +106,10 @@ static int find_last(const carom_tape *t, const crm_island *i)
 {
     const int end = t->frames[t->frame].first_record;
     const int from = t->frame > 0 ? t->frames[t->frame - 1].first_record : end;
+    const int start = t->next_known > from && t->next_known < end ? t->next_known : from;
     const size_t bytes = (size_t)i->n_bodies * sizeof *i->bodies;
-    for (int k = from; k < end; k++) {
+    for (int n = 0; n < end - from; n++) {
+        const int k = from + (start - from + n) % (end - from); /* islands keep their order */
         const crm_record *r = &t->records[k];
         if (r->island.n_bodies != i->n_bodies || memcmp(r->island.bodies, i->bodies, bytes)) {
             continue;
@@ -147,7 +149,9 @@ static carom_status record_again(void *user, int *known)
     if (!*known) return CAROM_OK;
     const int which = t->records[first].which;
     const int end = t->frames[t->frame].first_record;
-    for (int k = first; !e && k < end && t->records[k].which == which; k++) e = repeat_record(t, k);
+    int k = first;
+    while (!e && k < end && t->records[k].which == which) e = repeat_record(t, k++);
+    t->next_known = k;
     return e;
 }
 

@@ -245,7 +245,8 @@ typedef struct carom_step_stats {
 
 /* Advances by dt.  force: (torque, fx, fy) per body for this step, added to the constant forces;
  * NULL: none.  For a kinematic body it is an acceleration: (w - v) / dt leads it to the velocity w
- * at the end of the step, by the mean of both velocities on the way (euler: by w).  stats may be NULL.  On a negative status the world is as it was. */
+ * at the end of the step, by the mean of both velocities on the way (euler: by w).  stats may be
+ * NULL.  On a negative status the world is as it was. */
 CAROM_API carom_status carom_world_step(carom_world *world, const double *force,
                                         carom_step_stats *stats);
 
